@@ -17,9 +17,11 @@ import torch
 
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.view import DEMO, KEYS, PAGE_KEYS, Asked, parsed, serve, view_folder
+from rgspipe.datasets.light_file import write_lights
 from rgspipe.errors import InputError
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.scene import PointLight
 from rgspipe.viewer.serve import view
 from rooms import closed_box
 
@@ -101,6 +103,23 @@ def test_lamps_are_exported_to_where_they_are_in_the_scene_s_own_file(
     monkeypatch.setattr("rgspipe.viewer.serve.view", lambda *_, **words: given.update(words) or Served())
     assert view_folder([str(folder), "browser=false"]) == 0
     assert given["world"] == World(1.0, 0.25, (1.0, 2.0, -3.0))
+
+
+def test_lamps_of_another_scene_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for scene in ("hall", "room"):
+        folder = tmp_path / scene / "freeze" / "aa"
+        folder.mkdir(parents=True)
+        told = {"schema": 1, "stage": "freeze", "fingerprint": "aa", "inputs": {}, "files": {}, "facts": {}}
+        (folder / "manifest.json").write_text(json.dumps(told))
+        write_lights(folder / "lights.json", PointLight([0.0, 0.0, 0.1], 1.0))
+    monkeypatch.setattr(FrozenScene, "load", lambda folder: FrozenScene.freeze(closed_box(0.5).to(torch.float32)))
+    monkeypatch.setattr("rgspipe.viewer.serve.view", lambda *_, **words: Served())
+    for scene, said in (("hall", 1), ("room", 0)):
+        lights = tmp_path / scene / "freeze" / "aa" / "lights.json"
+        assert view_folder([str(folder), f"lights={lights}", "browser=false"]) == 0
+        assert capsys.readouterr().out.count("its lights are those of the scene hall") == said
 
 
 class Served:

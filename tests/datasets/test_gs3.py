@@ -14,7 +14,7 @@ import torch
 from PIL import Image
 
 from rgspipe.datasets.exr import write_channels, write_image
-from rgspipe.datasets.gs3 import load_dataset, load_target
+from rgspipe.datasets.gs3 import load_dataset, load_target, target_folders
 from rgspipe.datasets.images import read_depth
 from rgspipe.datasets.location import load_views, open_dataset, point_at_dataset
 from rgspipe.errors import InputError
@@ -457,3 +457,12 @@ def test_an_image_whose_suffix_has_other_letters_is_found(dataset: Path, change:
     (dataset / "train/r_0000.exr").rename(dataset / "train/r_0000.EXR")
     change(TRAIN, lambda content: content["frames"][0].update(file_path="train/r_0000.exr"))
     load_dataset(dataset)
+
+
+def test_targets_that_no_list_names_go_by_the_numbers_in_their_names(dataset: Path) -> None:
+    """A sequence of frames that were numbered without zeros is in the order in which it was taken."""
+    (dataset / "targets/targets.json").unlink(missing_ok=True)
+    (dataset / "targets/one").rename(dataset / "targets/frame_2")
+    for name in ("frame_10", "frame_1", "3", "frame"):
+        shutil.copytree(dataset / "targets/frame_2", dataset / "targets" / name)
+    assert [path.name for path in target_folders(dataset)] == ["3", "frame", "frame_1", "frame_2", "frame_10"]

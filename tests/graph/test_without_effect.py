@@ -61,6 +61,12 @@ def idle(overrides: Sequence[str], resolver: Resolver) -> list[str]:
         ),
         ("stage=relight relight.sweep=orbit relight.path.radius=2", ""),
         ("stage=overview scene=room", "scene=room"),
+        # The report prints every setting, and has numbers of views of its own.
+        (
+            "stage=report scene=room report.views=[1] views.count=3 light.spot.cone_angle=30 export.metres=2",
+            "views.count=3 light.spot.cone_angle=30 export.metres=2",
+        ),
+        ("stage=report train.steps=3 evaluate.success=0.1 light.count=2 relight.seed=3", "relight.seed=3"),
         ("stage=export export.metres=2", "export.metres=2"),
         ("stage=freeze hydra.job.name=one launcher=basic", ""),
     ],

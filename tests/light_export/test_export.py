@@ -49,6 +49,17 @@ def test_every_format_is_written_for_every_kind(tmp_path: Path) -> None:
     assert "lumens" not in (tmp_path / "lamps.txt").read_text() and "683" in (tmp_path / "lamps.txt").read_text()
 
 
+def test_light_from_all_around_is_in_json_and_said_of_the_others(tmp_path: Path) -> None:
+    """Radiance is the same in every unit of length."""
+    around = torch.tensor([0.5, 0.25, 1.0]).double()
+    done = export_lights(BY_KIND["point"], tmp_path, ["json", "blend"], metres=2.0, ambient=around)
+    assert rg.read_ambient(tmp_path / "lamps.json").tolist() == around.tolist()
+    said = "light from all around, (0.5, 0.25, 1) W/(sr·m²), which JSON alone holds"
+    assert any(said in line for line in done.lines) and said in (tmp_path / "lamps.txt").read_text()
+    alone = export_lights(BY_KIND["point"], tmp_path, ["json"], ambient=around, notes=["As it was."])
+    assert "As it was." in alone.lines and not any("all around" in line for line in alone.lines)
+
+
 @pytest.mark.parametrize("metres", [0.1, 1.0, 10.0])
 def test_a_light_file_in_metres_gives_the_same_irradiance(tmp_path: Path, metres: float) -> None:
     """I/d² is the same in both units, and so is a sun's irradiance."""

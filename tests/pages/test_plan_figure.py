@@ -37,7 +37,7 @@ def test_what_no_camera_saw_has_a_colour_of_its_own():
     figure = plan_figure(cloud, None, [CAMERA] * 3, [], {}, (), guessed)
     drawn = [(line.get_color(), len(line.get_xdata())) for line in figure.axes[0].lines[:2]]
     assert drawn == [(SEEN, 70), (GUESSED, 30)]
-    assert _legend(figure)[-1] == "surface that no camera saw, added to close the room"
+    assert _legend(figure)[-1] == "surface that no camera saw, added"
     assert not any("no camera" in text for text in _legend(plan_figure(cloud, None, [CAMERA] * 3, [], {})))
 
 

@@ -69,6 +69,7 @@ def test_a_judged_scene_stands_beside_true_surfels(full_report, full_contents, f
 
 def test_a_report_shows_the_scene_its_targets_and_their_truth(full_report):
     text = Page(full_report).text
+    assert "as noise no longer averages out" in text
     assert "8 training views of 16 × 8 pixels, 2 held-out views, 2 targets with 1 view each" in text
     assert "r_0007: light at (0.10, −0.20, 0.30), 1.00 / 1.50 / 2.00 W/sr" in text
     assert "visible_000: light at (0.10, −0.20, 0.30), 1.00 / 1.50 / 2.00 W/sr; recovered 1.23 % away" in text

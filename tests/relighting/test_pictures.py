@@ -54,6 +54,8 @@ def test_a_comparison_has_a_column_for_each_number_of_lights() -> None:
         Relit(lights, truth, 0.9 * truth, 20.0 + lights) for lights, truth in zip((1, 2, 8), truths, strict=True)
     ]
     figure = comparison_figure(columns)
+    assert [axis.get_ylabel() for axis in figure.axes[::3]] == ["path traced", "frozen scene", "difference"]
+    assert comparison_figure(columns, "target").axes[0].get_ylabel() == "target"
     titles = [axis.get_title(loc="left") for axis in figure.axes[:3]]
     assert titles == ["1 light", "2 lights", "8 lights"]
     assert [axis.get_xlabel() for axis in figure.axes[6:]] == ["21.0 dB", "22.0 dB", "28.0 dB"]

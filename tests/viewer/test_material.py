@@ -12,6 +12,7 @@ import torch
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.demo import TARGET
+from rgspipe.errors import InputError
 from rgspipe.scene import PointLight, SpotLight
 from rgspipe.stages.lights.capture import found_capture
 from rgspipe.viewer.drawings import ways
@@ -108,3 +109,11 @@ def test_the_target_of_the_demo_is_whole() -> None:
         # The lamp is out of sight of all of them.
         (x, y), depth = photograph.camera.project(case.truth[0].position)
         assert depth > 0 and 0 < x < 128 and 0 < y < 128
+
+
+def test_the_folder_of_all_fits_is_told_from_that_of_one(tmp_path: Path) -> None:
+    write_lights(tmp_path / "kitchen" / "lights.json", PointLight([0.0, 0.0, 0.5], 1.0))
+    with pytest.raises(InputError, match=r"found fits of kitchen\. Name one of them: .*kitchen"):
+        found_in(tmp_path)
+    with pytest.raises(InputError, match=r"lights\.json: expected a light file, found no such file"):
+        found_in(tmp_path / "nowhere")

@@ -21,6 +21,12 @@ def test_lamps_for_all_programs_are_in_one_file() -> None:
     assert {"lamp_1.ies", "lamps.txt"} <= names
 
 
+def test_light_from_all_around_goes_along() -> None:
+    zipped = exported((PointLight([0.0, 0.0, 0.5], 1.0),), World(), torch.tensor([0.5, 0.25, 1.0]))
+    with zipfile.ZipFile(io.BytesIO(zipped)) as archive:
+        assert b'"ambient"' in archive.read("lamps.json") and "all around" in archive.read("lamps.txt").decode()
+
+
 def test_a_swing_goes_to_both_sides_and_looks_at_one_point() -> None:
     camera = Camera.look_at([0.0, -2.0, 0.3], [0.0, 0.0, 0.0], width=16, height=12)
     frames = swing(camera, torch.zeros(3, dtype=torch.float64))

@@ -171,6 +171,17 @@ def test_illuminance_is_that_of_the_eye(session: Session) -> None:
     assert low < lux * float(arriving.mean()) / watts < high
 
 
+def test_lamps_that_are_added_do_not_hide_each_other(session: Session) -> None:
+    session.change(())
+    for _ in range(10):
+        session.add("point")
+    places = torch.stack([light.position for light in session.lights])
+    size, middle = session.images.frozen.size, sum(session.images.frozen.bounds).double() / 2
+    assert torch.pdist(places).min() > 0.09 * size  # measured 0.1: the first and its neighbours
+    assert torch.pdist(places[:2]).item() == pytest.approx(0.1 * size)
+    torch.testing.assert_close(places[0, :2], middle[:2].cpu())
+
+
 def test_photographs_of_other_lamps_are_dropped(session: Session) -> None:
     camera = room_cameras(8)[0]
     session.photograph(camera)

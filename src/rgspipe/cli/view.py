@@ -64,7 +64,7 @@ def view_folder(arguments: Sequence[str]) -> int:
     from rgspipe.renderer.frozen_file import SURFELS
     from rgspipe.stages.lights.capture import found_capture
     from rgspipe.stages.scene.export import world_of
-    from rgspipe.stages.scene.light_origin import origin_of
+    from rgspipe.stages.scene.light_origin import elsewhere_line, origin_of
     from rgspipe.stages.sources import check_target
     from rgspipe.viewer.material import Case, case_in, found_in
     from rgspipe.viewer.serve import view
@@ -73,6 +73,10 @@ def view_folder(arguments: Sequence[str]) -> int:
     if asked.target is not None:
         check_target(asked.target)
     found = None if asked.fit is None else found_in(asked.fit)
+    given = [] if asked.lights is None else [Path(asked.lights)]
+    given += [] if asked.fit is None else [Path(asked.fit) / "lights.json"]
+    for line in filter(None, (elsewhere_line(file, Path(asked.folder) / SURFELS) for file in given)):
+        print(line)
     case = Case(found=found) if asked.target is None else case_in(asked.target, found, found_capture)
     viewer = view(
         FrozenScene.load(asked.folder).to(device),

@@ -6,6 +6,8 @@ broken, missing or ambiguous gets past this module.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -132,8 +134,14 @@ def target_folders(root: str | Path) -> list[Path]:
         return []
     listed = _listed_targets(folder)
     there = (path.name for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
-    names: Iterable[str] = listed or sorted(there)
+    names: Iterable[str] = listed or sorted(there, key=_counted)
     return [folder / name for name in names]
+
+
+def _counted(name: str) -> tuple[list[tuple[float, str]], str]:
+    """What puts names in order: numbers in them by value, so that frame_2 goes before frame_10."""
+    parts = re.findall(r"\d+|\D+", name)
+    return [(int(part), "") if part.isdecimal() else (math.inf, part) for part in parts], name
 
 
 def _load_targets(root: Path) -> tuple[Target, ...]:

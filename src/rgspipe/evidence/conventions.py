@@ -21,7 +21,6 @@ from rgspipe.evidence.reprojection import Agreement, Trials
 #: points do not tell. Poses of other photographs leave 0.17 to 0.27, poses that are 5 % of the room and 3° off 0.53.
 LEAST_AGREEING, LEAST_TESTED = 0.4, 300
 
-
 #: A view is astray where more than this part of its points that can be compared, and so many times as many as of the
 #: median view, contradict others; of fewer points nothing is said. A pose that is 0.8 m off in a room of 4.2 m has
 #: 0.26, beside 0.02; the worst of twenty good ones has 0.03, with depth of half the pixels 0.08 beside 0.06.

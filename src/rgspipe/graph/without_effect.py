@@ -13,6 +13,7 @@ from rgspipe.graph.nodes import Node
 from rgspipe.graph.resolver import Resolver
 from rgspipe.graph.variants import below, key_of
 from rgspipe.machine.resources import resource_folder
+from rgspipe.store.artifacts import Key
 
 #: Keys and sections that say how a run is done, or whether at all; by design no result depends on them.
 OPERATION = (
@@ -71,7 +72,12 @@ def _nodes(node: Node) -> Iterator[Node]:
 
 def _counts(keys: Collection[str], nodes: Sequence[Node]) -> bool:
     """Whether one of the keys is in a recipe as the command has it, which is seen at once."""
-    return any(below(key, node.recipe["config"]) for node in nodes for key in keys if key not in node.changes)
+    return any(below(key, _counted(node)) for node in nodes for key in keys if key not in node.changes)
+
+
+def _counted(node: Node) -> Collection[str]:
+    """Keys and sections that a node's own content depends on, more than by printing them."""
+    return node.recipe["config"] if node.stage.own_keys is None else node.stage.own_keys
 
 
 def _changes(keys: Collection[str], root: Node, resolver: Resolver) -> bool:
@@ -80,6 +86,12 @@ def _changes(keys: Collection[str], root: Node, resolver: Resolver) -> bool:
     if all(get_value(root.config, key) == value for key, value in plain.items()):
         return True
     try:
-        return resolver.resolve(root.stage.name, with_changes(root.config, plain), {}).key != root.key
+        other = resolver.resolve(root.stage.name, with_changes(root.config, plain), {})
     except InputError:
         return True
+    return _made_from(other) != _made_from(root)
+
+
+def _made_from(root: Node) -> list[Key]:
+    """What tells the same result: its key, or those of its inputs where that follows from what it only prints."""
+    return [root.key] if root.stage.own_keys is None else [needed.key for needed in root.inputs]

@@ -20,8 +20,9 @@ SCRIPT = '''"""Lamps found by rgspipe, in metres and watts.
 
 Open your file and run this in Blender's Scripting workspace; or, without a window,
     blender YOUR.blend --background --python THIS.py -- OUT.blend
-They render as they were found with Cycles if "Light Threshold" (Sampling, Lights) and both values of "Clamping" are 0:
-Blender's defaults leave out dim and bright light. A wire ellipsoid around a lamp holds its place with 95 %.
+They render as they were found with Cycles if "Max Bounces" (Light Paths) are 64, "Total" and "Diffuse", and "Light
+Threshold" (Sampling, Lights) and both values of "Clamping" are 0: Blender's defaults leave out late bounces, up to a
+third of the light, and what is dim or bright. A wire ellipsoid around a lamp holds its place with 95 %.
 """
 
 import sys

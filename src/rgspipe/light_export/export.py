@@ -10,7 +10,7 @@ from typing import get_args
 from torch import Tensor
 
 from rgspipe.arguments import as_path, as_several
-from rgspipe.datasets.light_file import WORLD, write_lights
+from rgspipe.datasets.light_file import AMBIENT, RADIANCE, WORLD, write_lights
 from rgspipe.errors import InputError
 from rgspipe.light_export.blend import blend
 from rgspipe.light_export.gltf import gltf
@@ -31,6 +31,12 @@ FORMATS: tuple[LightFormat, ...] = get_args(LightFormat)
 #: Files of formats that hold all lights in one.
 NAMES = {"blend": "lamps_blender.py", "usda": "lamps.usda", "gltf": "lamps.gltf"}
 NAMES |= {"mitsuba": "lamps_mitsuba.xml", "three": "lamps_three.json", "json": "lamps.json"}
+
+#: Said of light that is no lamp's.
+AROUND = (
+    "With them came light from all around, ({}) W/(sr·m²), which JSON alone holds: give it to the world "
+    "(Blender: World > Background, strength 1), or renders are too dark."
+)
 
 _WRITERS: dict[str, Callable[[Numbered], tuple[str, list[str]]]] = {
     "usda": usda,
@@ -61,6 +67,8 @@ def export_lights(
     metres: float = 1.0,
     world: World | None = None,
     covariances: Sequence[Tensor | None] = (),
+    ambient: Tensor | None = None,
+    notes: Sequence[str] = (),
 ) -> LightExport:
     """Write lights into `folder` for other programs: a file a format, and lamps.txt with their units.
 
@@ -69,6 +77,8 @@ def export_lights(
         metres: per scene unit.
         world: how scene units came about, instead of `metres`.
         covariances: of each light, of which the first three rows are its place [scene units²].
+        ambient: (3,) radiance that came from all around beside them; json alone holds it.
+        notes: further lines for lamps.txt, such as what the fit doubted.
 
     Raises:
         InputError: an unknown format, a unit that is none, or a light that a format cannot hold.
@@ -88,10 +98,13 @@ def export_lights(
     for path, text, _ in made:
         if text is None:
             moved = {} if world == World() else {WORLD: asdict(world)}
-            write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"} | moved)
+            around = {} if ambient is None else {AMBIENT: {RADIANCE: ambient.tolist()}}
+            write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"} | moved | around)
         else:
             write_text(path, text)
-    notes = [note for _, _, said in made for note in said] + _lost(rig, {*formats})
+    notes = [*notes, *(note for _, _, said in made for note in said), *_lost(rig, {*formats})]
+    if ambient is not None and {*formats} != {"json"}:
+        notes.append(AROUND.format(", ".join(f"{value:.4g}" for value in ambient.tolist())))
     if "blend" in formats and world.metres != 1.0:
         notes.append(f"{NAMES['blend']} is in metres: for a file whose unit is another, export it with metres=1.")
     write_text(folder / "lamps.txt", f"{world.line()}\n\n{table(rig)}" + "".join(f"{note}\n" for note in notes))

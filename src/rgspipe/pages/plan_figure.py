@@ -77,7 +77,7 @@ def plan_figure(
             axis.set_title(title)
         handles = _handles(bool(cameras), bool(len(lights)), targets, bool(target_cameras))
         if unseen.any():
-            words = "surface that no camera saw, added to close the room"
+            words = "surface that no camera saw, added"
             handles.append(Line2D([], [], color=GUESSED, marker=".", ls="", ms=5, label=words))
         figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8.5)
     return figure

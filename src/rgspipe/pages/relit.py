@@ -26,7 +26,7 @@ KINDS = {
     ),
     "targets": (
         "The true lights of the targets",
-        "The lights that fits look for, in the frozen scene, beside the path-traced images: what is left between them "
+        "The lights that fits look for, in the frozen scene, beside the targets' own images: what is left between them "
         "is what a perfect fit would leave. Each column is the image with the median PSNR.",
     ),
     "rig": ("In other lights", "One rig, seen by every camera; all pictures are exposed alike."),
@@ -36,7 +36,7 @@ KINDS = {
 #: What the picture of each kind shows, for those who cannot see it.
 ALT = {
     "counts": "path-traced truth, frozen scene and difference for each number of lights",
-    "targets": "path-traced truth, frozen scene and difference",
+    "targets": "target, frozen scene and difference",
     "rig": "the scene under one rig, a picture for each camera",
     "aim": "frames of a spot that turns, in order",
     "orbit": "frames of a spot that goes around, in order",

@@ -70,6 +70,7 @@ class ReportContents:
         true_summary: rows of `summary_table` for lights recovered with surfels made from the truth.
         comparison: PNG of truth, render and difference of held-out views, or None.
         gallery: pictures of the dataset, or None.
+        captured: the lamps that were found in photographs under unknown lamps, where the scene is made of such.
         study: rows of `study_row` of this scene: what bad captures cost; None if no study has been made.
         study_remark: what the reader must know of that study, or "".
         light_studies: studies of recovered lights that have been made, with the rows of this scene.
@@ -100,6 +101,7 @@ class ReportContents:
     true_summary: pd.DataFrame | None = None
     comparison: bytes | None = None
     gallery: Gallery | None = None
+    captured: Sequence[Section] = ()
     study: pd.DataFrame | None = None
     study_remark: str = ""
     light_studies: Sequence[LightStudy] = ()
@@ -130,6 +132,7 @@ def render_report(contents: ReportContents) -> str:
         relightings=relightings(contents.relightings),
         galleries=shown_sections(contents.galleries),
         found=shown_sections(contents.sections),
+        captured=shown_sections(contents.captured),
         true_surfels=TRUTH,
         goals=_goals(contents, found["psnr"], method) if contents.is_measured else [],
         method=method,
@@ -223,8 +226,8 @@ def _training_rows(training: Mapping[str, Any] | None) -> list[dict]:
     rows = []
     for key, label, unit, digits in _TRAINING_ROWS:
         value = training.get(key)
-        shown = "not recorded" if value is None else f"{float(value):,.{digits}f} {unit}".strip()
-        rows.append({"label": label, "value": shown})
+        if value is not None:
+            rows.append({"label": label, "value": f"{float(value):,.{digits}f} {unit}".strip()})
     return rows
 
 
@@ -242,11 +245,13 @@ def _target_rows(targets: pd.DataFrame) -> list[dict]:
             verdict = f"no: {row['lights_found']} found, {row['lights_true']:.0f} there"
         elif verdict != "unknown" and not row["types_right"]:
             verdict += ", wrong type"
+        strength = " / ".join(decimals(row[colour], 3) for colour in "rgb")
         estimate, truth = (", ".join(decimals(row[axis + suffix], 3) for axis in "xyz") for suffix in ("", "_true"))
         ended, why = (
             row[name] if isinstance(row[name], str) and row[name] else MISSING for name in ("result", "reason")
         )
-        rows.append(row | {"verdict": verdict, "estimate": estimate, "truth": truth, "ended": ended, "why": why})
+        told = {"verdict": verdict, "estimate": estimate, "strength": strength, "truth": truth}
+        rows.append(row | told | {"ended": ended, "why": why})
     return rows
 
 

@@ -84,17 +84,20 @@ def video(frames: Sequence[Bytes], seconds: float) -> bytes:
     return buffer.getvalue()
 
 
-def comparison_figure(columns: Sequence[Relit]) -> Figure:
-    """A column for each number of lights: path-traced truth, render, and signed difference with the PSNR.
+def comparison_figure(columns: Sequence[Relit], truth: str = "path traced") -> Figure:
+    """A column for each number of lights: truth, render, and signed difference with the PSNR.
 
     Each column is exposed for its truth.
+
+    Args:
+        truth: what the images are that are compared with.
 
     Raises:
         ValueError: there are no columns.
     """
     if not columns:
         raise ValueError("nothing to compare")
-    rows = ("path traced", "frozen scene", "difference")
+    rows = (truth, "frozen scene", "difference")
     height, width = columns[0].truth.shape[:2]
     with matplotlib.rc_context(STYLE):
         row_height = COLUMN_WIDTH * height / width + 0.1

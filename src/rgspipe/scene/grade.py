@@ -14,7 +14,6 @@ ERROR_PER_LIGHT = 0.1
 #: a light counts as found, and three times that.
 GOOD, FAIR = 0.01, 0.03
 
-
 #: Standard deviation of the logarithm of all intensities together up to which their scale is tied down.
 TIED = 0.1
 

@@ -119,6 +119,7 @@ class Stage:
         remarks: lines that the plan shows below the stage, from the configuration and, by stage, the artifact itself
             where it is reused, or else those of its inputs that are made already.
         of_scenes: whether it is of no single scene; its results then lie under outputs/scenes/.
+        own_keys: of a stage that prints all of `config_keys`, those that count for more than that; None where all do.
     """
 
     name: str
@@ -129,6 +130,7 @@ class Stage:
     files: Callable[[RgspipeConfig], Sequence[Path]] = _nothing
     remarks: Callable[[RgspipeConfig, Mapping[str, Artifact]], Sequence[str]] = _no_remarks
     of_scenes: bool = False
+    own_keys: Sequence[str] | None = None
 
     def place(self, config: RgspipeConfig) -> str:
         """The folder under outputs/ that its results lie in."""

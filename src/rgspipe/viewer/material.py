@@ -17,6 +17,7 @@ from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_ambient, read_lights
 from rgspipe.datasets.views import Target, View
+from rgspipe.errors import InputError
 from rgspipe.fitting import FitResult
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.model.capture import SATURATED, ImageCapture
@@ -172,8 +173,15 @@ def truth_of(target: str | Path) -> LightRig:
 
 
 def found_in(fit: str | Path) -> Found:
-    """What is in the folder of a target's fit."""
+    """What is in the folder of a target's fit.
+
+    Raises:
+        InputError: it has no lights, as the folder of all fits, or they cannot be read.
+    """
     path = Path(fit) / "lights.json"
+    if not path.exists() and (fits := sorted(file.parent.name for file in Path(fit).glob("*/lights.json"))):
+        found, remedy = f"fits of {', '.join(fits)}", f"Name one of them: {Path(fit) / fits[0]}."
+        raise InputError(fit, expected="the folder of one target's fit", found=found, remedy=remedy)
     lights, told = read_lights(path), read_json(path, "a fit's light file")
     costs = {int(count): float(cost) for count, cost in told.get("costs", {}).items()}
     covariances = read_covariances(path)

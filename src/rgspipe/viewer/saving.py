@@ -44,7 +44,9 @@ class Saving:
             self._send("lights.json", path.read_bytes())
 
     def _export(self) -> None:
-        self._send("lamps.zip", exported(self._session.lights, self._visit.exhibit.world))
+        found = self._session.found
+        ambient = None if found is None else found.ambient
+        self._send("lamps.zip", exported(self._session.lights, self._visit.exhibit.world, ambient))
 
     def _still(self) -> None:
         if (camera := self._visit.camera()) is not None:
@@ -78,11 +80,11 @@ class Saving:
         self._visit.client.send_file_download(name, content, save_immediately=True)
 
 
-def exported(lights: LightRig, world: World) -> bytes:
-    """A zip file of lamps in the formats of other programs."""
+def exported(lights: LightRig, world: World, ambient: Tensor | None = None) -> bytes:
+    """A zip file of lamps in the formats of other programs, and of the radiance (3,) that came from all around."""
     buffer = io.BytesIO()
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        export_lights(lights, folder, world=world)
+        export_lights(lights, folder, world=world, ambient=ambient)
         for path in sorted(Path(folder).iterdir()):
             archive.write(path, path.name)
     return buffer.getvalue()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -29,6 +31,9 @@ SHOWN = (PICTURE, IRRADIANCE, ILLUMINANCE)
 
 #: Two answers are one where their lamps are no farther apart, of the scene's size.
 SAME = 0.01
+
+#: How far from one another lamps are that are added one after the other, of the scene's size.
+GAP = 0.1
 
 #: Steps that can be undone.
 STEPS = 100
@@ -88,15 +93,19 @@ class Session:
         self._past, self._gesture = [], None
 
     def add(self, kind: str = "point") -> int:
-        """A lamp above the middle of the scene, as bright as the others are on average; its index."""
+        """A lamp above the middle of the scene, or beside those that are there, as bright as the mean; its index."""
         lower, upper = (corner.double().cpu() for corner in self.images.frozen.bounds)
         middle = 0.5 * (lower + upper)
-        position = torch.stack([middle[0], middle[1], middle[2] + 0.25 * (upper[2] - lower[2])])
+        above = torch.stack([middle[0], middle[1], middle[2] + 0.25 * (upper[2] - lower[2])])
         size = max(self.images.frozen.size, 1e-6)
+        position = next(place for place in _around(above, GAP * size) if self._is_free(place, 0.5 * GAP * size))
         level = [float(light.intensity.mean()) for light in self.lights] or [0.5 * size**2]
         intensity = torch.full((3,), sum(level) / len(level), dtype=torch.float64)
         self.change([*self.lights, _of_kind(kind, position, intensity, None, size)])
         return len(self.lights) - 1
+
+    def _is_free(self, place: Tensor, distance: float) -> bool:
+        return all(float((light.position - place).norm()) > distance for light in self.lights)
 
     def remove(self, index: int) -> None:
         """Take a lamp away."""
@@ -217,6 +226,13 @@ def alike(one: LightRig, other: LightRig, apart: float) -> bool:
 
 def _fields(light: Light) -> tuple:
     return light.kind, light.position.tolist(), light.intensity.tolist(), light.file_fields()
+
+
+def _around(middle: Tensor, gap: float) -> Iterator[Tensor]:
+    """Places at the height of `middle` (3,), outwards on a sunflower's spiral: neighbours are about `gap` apart."""
+    for number in itertools.count():
+        angle, radius = number * math.pi * (3.0 - math.sqrt(5.0)), gap * math.sqrt(number)
+        yield middle + torch.tensor([radius * math.cos(angle), radius * math.sin(angle), 0.0], dtype=torch.float64)
 
 
 def _of_kind(kind: str, position: Tensor, intensity: Tensor, axis: Tensor | None, size: float) -> Light:

@@ -18,6 +18,7 @@ from rgspipe.graph.resolver import resolve
 from rgspipe.scene import PointLight
 from rgspipe.stages import load_stage
 from rgspipe.stages.scene.export import world_of
+from rgspipe.stages.scene.light_origin import elsewhere_line
 
 LIGHT = PointLight(torch.tensor([0.1, -0.25, 0.3]).double(), torch.tensor([1.0, 2.0, 0.5]).double())
 
@@ -76,6 +77,34 @@ def test_lights_of_a_fit_are_put_where_its_own_dataset_says(tmp_path: Path) -> N
         artifact = run(configured(tmp_path, *other, f"export.light={light}", "export.lights=[json]"), load_stage)
         (found,) = read_lights(artifact.file("lamps.json"), any_world=True)
         torch.testing.assert_close(found.position, LIGHT.position / 0.2 - torch.tensor([1.0, 2.0, -3.0]).double())
+
+
+def test_what_a_fit_doubts_and_what_nothing_measured_is_said(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """Watts of a lamp that may not be there, or that only photographs tell, are not handed on without a word."""
+    scene = tmp_path / "room"
+    made(scene / "capture_surfels" / ("a" * 16), {})
+    made(scene / "freeze" / ("b" * 16), {"capture_surfels": ["a" * 16]})
+    made(scene / "fit_light" / ("c" * 16), {"freeze": ["b" * 16]})
+    light = scene / "fit_light" / ("c" * 16) / "lights.json"
+    write_lights(light, LIGHT, {"result": "ambiguous", "reason": "Light 1 may not be there."})
+    artifact = run(configured(tmp_path, f"export.light={light}", "export.lights=[blend]"), load_stage)
+    for told in (artifact.file("lamps.txt").read_text(), capsys.readouterr().out):
+        assert "The fit that found these lights is ambiguous: Light 1 may not be there." in told
+        assert "under lamps that nobody measured" in told
+    certain = tmp_path / "lights.json"
+    write_lights(certain, LIGHT, {"result": "converged", "reason": "The loss has a minimum here."})
+    artifact = run(configured(tmp_path, f"export.light={certain}", "export.lights=[blend]"), load_stage)
+    told = artifact.file("lamps.txt").read_text()
+    assert "The fit" not in told and "nobody measured" not in told
+
+
+def test_lights_of_another_scene_are_told(tmp_path: Path) -> None:
+    """Their coordinates are those of another file: the picture would be one of lamps that stand anywhere."""
+    for scene in ("hall", "room"):
+        made(tmp_path / scene / "freeze" / ("b" * 16), {})
+    own, other = (tmp_path / scene / "freeze" / ("b" * 16) / "lights.json" for scene in ("room", "hall"))
+    assert elsewhere_line(own, own) == elsewhere_line(tmp_path / "mine.json", own) == ""
+    assert "its lights are those of the scene hall; here they stand" in elsewhere_line(other, own)
 
 
 def made(folder: Path, inputs: dict) -> None:

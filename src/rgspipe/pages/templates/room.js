@@ -121,7 +121,7 @@ for (const box of document.querySelectorAll(".room")) {
   const say = (light, told) => { said.textContent = light ? `${light.target}, ${light.label}: ${told ?? error(light)}` : "\u00a0"; };
   const fill = () => {
     const names = [...new Set(lamps().map((light) => light.target))];
-    target.replaceChildren(new Option(`all ${names.length} targets`, ""), ...names.map((name) => new Option(name, name)));
+    target.replaceChildren(new Option(names.length > 1 ? `all ${names.length} targets` : "the target", ""), ...names.map((name) => new Option(name, name)));
   };
   let waiting = 0;
   const soon = () => { cancelAnimationFrame(waiting); waiting = requestAnimationFrame(draw); };

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import torch
 
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.spoken import as_keys
+from rgspipe.datasets.gs3 import TargetFolder, target_folders
 from rgspipe.datasets.light_file import read_lights, write_lights
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.read_files import files_read
@@ -27,7 +29,7 @@ from rgspipe.stages.lights.capture import KEYS as CAPTURE_KEYS
 from rgspipe.stages.lights.capture import captured_views
 from rgspipe.stages.lights.fit_light import Fitter, band_keys
 from rgspipe.stages.lights.spec import light_keys, table_files
-from rgspipe.stages.lights.targets import used_views, view_keys
+from rgspipe.stages.lights.targets import used_indices, used_views, view_keys
 from rgspipe.stages.scene.effects import effect_keys
 from rgspipe.store.files import write_bytes, write_text
 
@@ -37,10 +39,6 @@ def run(context: StageContext) -> None:
     config = context.config
     folder = _folder(context)
     targets = open_dataset(folder, train=False, test=False).targets
-    if not targets:
-        raise InputError(
-            folder, expected="targets/ with the frames", found="none", remedy="Give a folder with targets/<frame>/."
-        )
     fitter = Fitter.create(context)
     views, frames, captures = _frames(fitter, targets, config)
     track = track_lights(views, frames, options=config.track, search=fitter.solver(), capture=captures)
@@ -67,24 +65,25 @@ def _frames(
 ) -> tuple[FitViews, list[list[torch.Tensor]], list[ImageCapture]]:
     """The views that all frames share, the images of each frame, and how they were taken.
 
+    A pixel counts as the scene's where every frame says that it is: what a mask or the noise of an edge hides in one
+    frame is left out of all, which share what a search prepares.
+
     Raises:
-        InputError: the cameras or masks of two frames differ.
+        InputError: the cameras of two frames differ.
     """
-    frames, captures, prepared = [], [], None
-    for target in targets:
-        views, capture = captured_views(used_views(target, config), target.name, config)
-        own = fitter.prepare(views)
-        prepared = prepared or own
-        if own is not prepared:
+    taken = [captured_views(used_views(target, config), target.name, config) for target in targets]
+    [first, *others] = [views for views, _ in taken]
+    for target, views in zip(targets[1:], others, strict=True):
+        if [view.camera for view in views] != [view.camera for view in first]:
             raise InputError(
                 f"target {target.name}",
-                expected=f"the cameras and masks of the first frame, {targets[0].name}",
+                expected=f"the cameras of the first frame, {targets[0].name}",
                 found="others",
                 remedy="Follow frames of fixed cameras.",
             )
-        frames.append([view.image for view in views])
-        captures.append(capture)
-    return prepared, frames, captures
+    shared = [torch.stack([view.alpha for view in same]).amin(dim=0) for same in zip(first, *others, strict=True)]
+    prepared = fitter.prepare([replace(view, alpha=alpha) for view, alpha in zip(first, shared, strict=True)])
+    return prepared, [[view.image for view in views] for views, _ in taken], [capture for _, capture in taken]
 
 
 def _truths(root: Path, names: Sequence[str]) -> list[LightRig]:
@@ -111,8 +110,21 @@ def _inputs(config: RgspipeConfig) -> list[Need | str]:
 
 
 def _files(config: RgspipeConfig) -> list[Path]:
-    tables = table_files(config)
-    return tables if config.track.folder is None else [*tables, *files_read(config.track.folder)]
+    """The frames, read now: what is wrong with them should show before a scene is trained.
+
+    Raises:
+        InputError: there are none, or they have fewer views than are asked for.
+    """
+    tables, folder = table_files(config), config.track.folder
+    if folder is None:
+        return tables
+    frames = target_folders(folder)
+    if not frames:
+        remedy = "Give the folder that holds targets/<frame>/transforms.json, not targets/ itself or one of the frames."
+        raise InputError(folder, expected="targets/ with the frames", found="none", remedy=remedy)
+    for frame in map(TargetFolder.of, frames):
+        used_indices(frame.name, frame.views, config)
+    return [*tables, *files_read(folder)]
 
 
 def _keys(config: RgspipeConfig) -> list[str]:

@@ -15,6 +15,7 @@ from rgspipe.errors import InputError
 from rgspipe.evaluation.images import save_png
 from rgspipe.relighting.pictures import contact_sheet
 from rgspipe.relighting.rigs import random_rig
+from rgspipe.renderer.frozen_file import SURFELS
 from rgspipe.scene import Camera, LightRig
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.lights.shape import light_shape
@@ -22,6 +23,7 @@ from rgspipe.stages.relight.scene import Relighter, chosen_indices, configured_c
 from rgspipe.stages.relight.sweep import write_sweep
 from rgspipe.stages.relight.targets import relight_targets, target_needs
 from rgspipe.stages.scene.effects import effect_keys
+from rgspipe.stages.scene.light_origin import elsewhere_line
 from rgspipe.stages.sources import image_stage, require_images, target_stage
 from rgspipe.store.files import write_text
 
@@ -71,7 +73,10 @@ def shows(wanted: RelightConfig) -> str:
 def _relight_rig(context: StageContext, relighter: Relighter) -> pd.DataFrame:
     """One rig in every camera: images/, lights/ and sheet.png; a row an image."""
     name, rig = _rig(context, relighter)
-    ambient = None if context.config.relight.lights is None else read_ambient(context.config.relight.lights)
+    lights = context.config.relight.lights
+    if lights is not None and (line := elsewhere_line(Path(lights), relighter.freeze.file(SURFELS))):
+        print(line)
+    ambient = None if lights is None else read_ambient(lights)
     rows, images = relighter.write(context.folder, name, rig, _cameras(context), ambient)
     save_png(context.folder / SHEET, contact_sheet(images))
     return pd.DataFrame(rows)
@@ -169,7 +174,7 @@ def _keys(config: RgspipeConfig) -> list[str]:
 
 STAGE = Stage(
     name="relight",
-    help="the frozen scene in other lights: light files, rigs of targets beside path-traced truth, sweeps of a spot",
+    help="the frozen scene in other lights: light files, rigs of targets beside their images, sweeps of a spot",
     run=run,
     inputs=_inputs,
     config_keys=_keys,

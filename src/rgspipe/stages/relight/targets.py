@@ -1,4 +1,4 @@
-"""The true rigs of fit targets in the frozen scene, beside the path-traced images of those targets."""
+"""The true rigs of fit targets in the frozen scene, beside the images of those targets."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from rgspipe.relighting.table import compared, relight_summary, typical_rows
 from rgspipe.scene import LightRig
 from rgspipe.stages.base import Need, StageContext
 from rgspipe.stages.relight.scene import Relighter, chosen_indices, image_path, target_folders
-from rgspipe.stages.sources import target_stage
+from rgspipe.stages.sources import has_truth, target_stage
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import write_bytes, write_text
 
@@ -53,7 +53,9 @@ def relight_targets(context: StageContext, relighter: Relighter) -> pd.DataFrame
         render, _ = read_image(image_path(context.folder, row["rig"], row["view"]))
         shown.append(Relit(row["lights"], truths[row["rig"], row["view"]], render, row["psnr"]))
     if shown:
-        write_bytes(context.folder / COMPARISON, png_of(comparison_figure(shown)))
+        # A dataset may hold photographs as well.
+        name = "path traced" if has_truth(context.config) else "target"
+        write_bytes(context.folder / COMPARISON, png_of(comparison_figure(shown, name)))
     context.note(psnr=dict(zip(summary["lights"].astype(str), summary["psnr"].round(2), strict=True)))
     return table
 

@@ -22,21 +22,23 @@ from rgspipe.store.artifacts import Artifact
 METHOD = "search_lm"
 
 
-def dataset_gallery(made: Artifact | None, surfels: Surfels | None, targets: pd.DataFrame) -> Gallery | None:
+def dataset_gallery(
+    made: Artifact | None, surfels: Surfels | None, targets: pd.DataFrame, lamps: LightRig = ()
+) -> Gallery | None:
     """Training views, targets by class, and a plan of cameras and lights; None without a dataset.
 
     Args:
         made: what generate_dataset made.
         surfels: the frozen scene, for the plan.
         targets: rows of `target_table`, for the errors under the targets.
+        lamps: that were found in training views of unknown light.
     """
     if made is None:
         return None
     dataset = open_dataset(made.folder())
     truths = _truths(dataset)
-    return make_gallery(
-        dataset.train, len(dataset.test), dataset.targets, truths, _errors(targets), _plan(dataset, truths, surfels)
-    )
+    plan = _plan(dataset, truths, surfels, lamps)
+    return make_gallery(dataset.train, len(dataset.test), dataset.targets, truths, _errors(targets), plan)
 
 
 def camera_mark(camera: Camera) -> CameraMark:
@@ -60,7 +62,7 @@ def _errors(targets: pd.DataFrame) -> dict[str, float]:
     return dict(zip(rows["target"], rows["position_error"].astype(float), strict=True))
 
 
-def _plan(dataset: Dataset, truths: dict[str, LightRig], surfels: Surfels | None) -> bytes | None:
+def _plan(dataset: Dataset, truths: dict[str, LightRig], surfels: Surfels | None, lamps: LightRig) -> bytes | None:
     classes = class_order([target.occlusion for target in dataset.targets])
     placed = {
         name: [
@@ -79,7 +81,7 @@ def _plan(dataset: Dataset, truths: dict[str, LightRig], surfels: Surfels | None
         None if surfels is None else surfels.centers,
         None if surfels is None else surfels.normals,
         cameras,
-        [view.light.position.tolist() for view in dataset.train if view.light is not None],
+        [light.position.tolist() for light in (*lamps, *(view.light for view in dataset.train)) if light is not None],
         {name: found for name, found in placed.items() if found},
         [camera_mark(view.camera) for view in seen],
         None if surfels is None else surfels.guessed,

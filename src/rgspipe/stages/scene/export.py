@@ -9,16 +9,18 @@ from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.info import INFO
 from rgspipe.datasets.json_file import numbers, read_json
-from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.light_file import read_ambient, read_lights
 from rgspipe.datasets.ply.file import save_ply
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
+from rgspipe.fitting.findings import FitStatus
 from rgspipe.light_export.export import export_lights
 from rgspipe.light_export.world import World
+from rgspipe.renderer.ambient import ambient_radiance
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.frozen_file import SURFELS
 from rgspipe.stages.base import Stage, StageContext
-from rgspipe.stages.scene.light_origin import origin_of
+from rgspipe.stages.scene.light_origin import elsewhere_line, is_captured, origin_of
 from rgspipe.stages.sources import surfel_stage
 
 
@@ -33,8 +35,14 @@ def run(context: StageContext) -> None:
         (source,) = context.inputs.values()
         conversion = save_ply(path, load_surfels(source.file(SURFELS)), layout=options.layout)
     else:
-        frozen = FrozenScene.load(context.inputs["freeze"].folder())
+        freeze = context.inputs["freeze"]
+        frozen = FrozenScene.load(freeze.folder())
+        if line := elsewhere_line(Path(options.light), freeze.file(SURFELS)):
+            print(line)
         radiance = frozen.radiance_of(read_lights(options.light))
+        ambient, around = read_ambient(options.light), ambient_radiance(frozen)
+        if ambient is not None and around is not None:
+            radiance = radiance + ambient.to(around) * around
         conversion = save_ply(path, frozen.surfels, radiance=radiance, layout=options.layout)
     conversion = replace(conversion, path=path.name)  # the folder has another name once it is whole
     conversion.save(context.folder / "conversion.json")
@@ -48,10 +56,27 @@ def _lights(context: StageContext) -> None:
     dataset = context.inputs.get("generate_dataset")
     info = origin_of(Path(path)) if dataset is None else dataset.folder() / INFO
     world = world_of(config.export.metres, info)
-    rig = read_lights(path)
-    done = export_lights(rig, context.folder, config.export.lights, world=world, covariances=read_covariances(path))
+    rig, ambient, notes = read_lights(path), read_ambient(path), _doubts(Path(path))
+    given = {"world": world, "covariances": read_covariances(path), "ambient": ambient, "notes": notes}
+    done = export_lights(rig, context.folder, config.export.lights, **given)
     print("\n".join(done.lines))
     context.note(lights=len(rig), formats=list(config.export.lights))
+
+
+#: Of lamps in photographs alone.
+NO_WATTS = (
+    "The scene was learnt from photographs under lamps that nobody measured: W, cd and lm are right among its lamps, "
+    "and all of them up to the factor by which the photographs' values are radiance (of 8 bits, the brightest is 1)."
+)
+
+
+def _doubts(path: Path) -> list[str]:
+    """What the fit said of lights that it is not sure of, and of units that nothing ties down."""
+    told = read_json(path, "a light file")
+    status, reason = told.get("result"), told.get("reason", "")
+    unsure = isinstance(status, str) and status not in (FitStatus.CONVERGED, "")
+    said = [f"The fit that found these lights is {status}: {reason}"] if unsure else []
+    return [*said, NO_WATTS] if is_captured(path) else said
 
 
 def world_of(metres: float, info: Path | None) -> World:
