@@ -118,13 +118,14 @@ def _files(config: RgspipeConfig) -> list[Path]:
     tables, folder = table_files(config), config.track.folder
     if folder is None:
         return tables
+    read = files_read(folder)
     frames = target_folders(folder)
     if not frames:
         remedy = "Give the folder that holds targets/<frame>/transforms.json, not targets/ itself or one of the frames."
         raise InputError(folder, expected="targets/ with the frames", found="none", remedy=remedy)
     for frame in map(TargetFolder.of, frames):
         used_indices(frame.name, frame.views, config)
-    return [*tables, *files_read(folder)]
+    return [*tables, *read]
 
 
 def _keys(config: RgspipeConfig) -> list[str]:
