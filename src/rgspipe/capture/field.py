@@ -25,8 +25,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
+from rgspipe.capture.factors import Factors
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.planes import off_planes
 from rgspipe.capture.side_by_side import kept_property
@@ -215,8 +215,8 @@ class Field:
         return (self.precision + sp.diags(self.known.reshape(len(self.trust), -1).mean(axis=1))).tocsc()
 
     @kept_property
-    def _posterior(self) -> sp.linalg.SuperLU:
-        return factorised((sp.diags(self.weight) + self._prior).tocsc())
+    def _posterior(self) -> Factors:
+        return Factors((sp.diags(self.weight) + self._prior).tocsc())
 
     def _parts(self, residual: Numbers) -> Iterator[tuple[Field, Numbers]]:
         """The field of each channel with what of residuals (N, 3) is of it; all with the one field where it is one."""
@@ -241,11 +241,11 @@ class Field:
 
     def draws(self, samples: int, seed: int) -> Numbers:
         """(N, samples) the field beside its mean, as it may be after the measurements."""
-        return _drawn(self._posterior, samples, seed)
+        return self._posterior.drawn(samples, seed)
 
     def draws_before(self, samples: int, seed: int) -> Numbers:
         """(N, samples) the field as it may be before the measurements, and before what is known from elsewhere."""
-        return _drawn(factorised(self.precision), samples, seed)
+        return Factors(self.precision).drawn(samples, seed)
 
     def deviation(self, samples: int, seed: int) -> Numbers:
         """(N,) standard deviation of the field after the measurements, by draws of it in every channel."""
@@ -254,7 +254,7 @@ class Field:
     def deviance(self, residual: Numbers) -> float:
         """−2 log p of residuals (N, 3), up to a constant."""
         alike = self.known is None or self.known.ndim == 1
-        before = _log_determinant(factorised(self._prior)) if alike else None
+        before = Factors(self._prior).log_determinant if alike else None
         return sum(own._deviance(part, before) for own, part in self._parts(residual))
 
     @property
@@ -265,8 +265,8 @@ class Field:
     def _deviance(self, residual: Numbers, before: float | None) -> float:
         """With the logarithm of the determinant of the precision before, if it is known."""
         kept = self.weight > 0.0
-        determinant = _log_determinant(self._posterior) - np.log(self.weight[kept]).sum()
-        determinant -= _log_determinant(factorised(self._prior)) if before is None else before
+        determinant = self._posterior.log_determinant - np.log(self.weight[kept]).sum()
+        determinant -= Factors(self._prior).log_determinant if before is None else before
         return float((residual * self.whitened(residual)).sum() + residual.shape[1] * determinant)
 
 
@@ -274,20 +274,3 @@ def _sorted(matrix: sp.csc_matrix) -> sp.csc_matrix:
     """The matrix with its entries in order: a factorisation would sort them in place, while other threads read them."""
     matrix.sum_duplicates()
     return matrix
-
-
-def factorised(matrix: sp.csc_matrix) -> sp.linalg.SuperLU:
-    """A symmetric positive definite matrix, factorised."""
-    return splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-
-
-def _drawn(factors: sp.linalg.SuperLU, samples: int, seed: int) -> Numbers:
-    """(N, samples) draws of the precision that was factorised."""
-    # With D + Q = P' L U P and U = diag(U) L', what has this covariance is P' L √diag(U) times white noise.
-    white = np.random.default_rng(seed).standard_normal((factors.shape[0], samples))
-    return factors.solve((factors.L @ (np.sqrt(factors.U.diagonal())[:, None] * white))[factors.perm_r])
-
-
-def _log_determinant(factors: sp.linalg.SuperLU) -> float:
-    """Of a matrix that is positive definite."""
-    return float(np.log(np.abs(factors.U.diagonal())).sum())

@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.sparse as sp
 
-from rgspipe.capture.field import factorised
+from rgspipe.capture.factors import Factors
 from rgspipe.capture.lamps import LampProblem
 from rgspipe.capture.radiance import Measured
 from rgspipe.capture.search import FoundLamps, Tried
@@ -54,7 +54,7 @@ def informed(problem: LampProblem, others: Sequence[Tried]) -> LampProblem:
         weighted += weight * (log_albedo - np.log(problem.predicted))
     known = others[0].problem.field
     parts = zip(precision.T, np.split(weighted, precision.shape[1], axis=1), strict=True)
-    mean = [factorised((known.precision + sp.diags(own)).tocsc()).solve(part) for own, part in parts]
+    mean = [Factors((known.precision + sp.diags(own)).tocsc()).solve(part) for own, part in parts]
     predicted = problem.predicted * np.exp(np.concatenate(mean, axis=1))
     precision = precision if precision.shape[1] == 3 else precision[:, 0]
     field = replace(problem.field, variances=known.variances, rough=known.rough, known=precision)
