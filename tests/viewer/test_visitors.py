@@ -82,8 +82,7 @@ def wait_for(what: Callable[[], object]) -> None:
 
 def threads() -> list[str]:
     """Those of pages."""
-    names = [one.name for one in threading.enumerate()]
-    return [name for name in names if name.startswith("rgspipe-") and not name.startswith("rgspipe-kernel")]
+    return [one.name for one in threading.enumerate() if one.name.startswith("rgspipe-page")]
 
 
 @pytest.mark.parametrize("first", IMPOSSIBLE.values(), ids=IMPOSSIBLE)
@@ -96,6 +95,7 @@ def test_a_page_waits_for_a_camera_that_can_be_and_goes_with_its_visitor(viewer:
         browser.send(message())
         # The browser is told where to look from, and shown a picture.
         wait_until_told(browser, b"SetCameraPositionMessage", b"BackgroundImageMessage")
+        assert threads()
     wait_for(lambda: not viewer.pages and not threads())
 
 

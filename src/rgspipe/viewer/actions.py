@@ -41,8 +41,8 @@ class Actions:
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
-        self._queue = ThreadPoolExecutor(max_workers=1, thread_name_prefix="rgspipe-visitor")
-        self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="rgspipe-search")
+        self._queue = ThreadPoolExecutor(max_workers=1, thread_name_prefix="rgspipe-page-visitor")
+        self._beside = ThreadPoolExecutor(max_workers=1, thread_name_prefix="rgspipe-page-search")
 
     def offer(self, *actions: Action, chief: bool = False) -> list[viser.GuiButtonHandle]:
         """A button and a key for each; the buttons, of a brighter colour where they are what a visitor is here for."""

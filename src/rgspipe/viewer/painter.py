@@ -40,7 +40,7 @@ class Painter:
     ) -> None:
         self._session, self._camera, self._show, self._sharp, self._turn = session, camera, show, sharp, turn
         self._news, self._gone, self.at_rest = threading.Event(), False, threading.Event()
-        self._thread = threading.Thread(target=self._paint, name="rgspipe-painter", daemon=True)
+        self._thread = threading.Thread(target=self._paint, name="rgspipe-page-painter", daemon=True)
         self._thread.start()
 
     def changed(self) -> None:
