@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import torch
 
 from lit_room import VISIBLE, room_cameras
 from open_room import TINT, frozen_open_room, open_room_cameras
-from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.light_file import read_ambient, read_lights
 from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.result import dark_result
 from rgspipe.renderer.ambient import ambient_image
@@ -240,6 +241,50 @@ def test_a_comparison_has_what_was_found_to_come_through_openings() -> None:
     # That of the case is not in photographs under lamps of their own.
     own = Photograph("own", camera, session.images.image(camera, (LAMP,), "sharp"), lights=(LAMP,))
     assert (session.compared(own)[:, 56:].reshape(-1, 3).min(axis=0) >= 246).all()
+
+
+def test_pictures_have_what_comes_through_openings_until_it_is_taken_out(tmp_path: Path) -> None:
+    room, camera, ambient = frozen_open_room(), open_room_cameras(24)[2], 0.2 * TINT
+    session = Session(LampImages(room), (LAMP,), ambient)
+    lamp, around = session.images.image(camera, (LAMP,), "sharp"), ambient * ambient_image(room, camera)
+    assert float(around.max()) > 0.0
+    torch.testing.assert_close(session.image(camera), lamp + around)
+    taken = session.photograph(camera)
+    torch.testing.assert_close(taken.image, lamp + around)
+    assert (session.compared(taken)[:, 56:].reshape(-1, 3).min(axis=0) >= 246).all()
+    session.save(tmp_path / "lights.json")
+    torch.testing.assert_close(read_ambient(tmp_path / "lights.json"), ambient.double())
+    session.is_open_to_it = False
+    assert torch.equal(session.image(camera), lamp)
+    assert (session.compared(taken)[:, 56:].reshape(-1, 3).min(axis=0) >= 246).all(), "a photograph keeps its own"
+
+
+def test_what_arrives_from_all_around_is_radiance_times_pi_over_the_albedo() -> None:
+    room, camera, ambient = frozen_open_room(), open_room_cameras(24)[2], 0.2 * TINT
+    session = Session(LampImages(room), (), ambient)
+    assert bool((room.surfels.albedo == room.surfels.albedo[0]).all())
+    radiance = session.image(camera, "soft")
+    session.shown = IRRADIANCE
+    expected = radiance * torch.pi / room.surfels.albedo[0]
+    torch.testing.assert_close(session.image(camera, "soft"), expected)
+
+
+def test_on_black_surfaces_light_from_all_around_is_what_arrives_there() -> None:
+    """Of the albedo 0 in one channel and all but 0 in the other, with what white surfaces elsewhere send."""
+    room, camera = frozen_open_room(), open_room_cameras(24)[2]
+    albedo = room.surfels.albedo.clone()
+    albedo[::2] = torch.tensor([0.0, 1.01e-3, 0.5]).to(albedo)
+    albedo[1::2, 0] = albedo[1::2, 1]
+    dyed = FrozenScene.freeze(replace(room.surfels, albedo=albedo), gather_rays=64, patches=150, seed=0)
+    seen = LampImages(dyed).irradiance(camera, (), "soft", torch.ones(3))
+    torch.testing.assert_close(seen[..., 0], seen[..., 1], rtol=0.01, atol=1e-3)
+
+
+def test_a_closed_room_shows_nothing_of_what_is_around_it(session: Session) -> None:
+    camera = room_cameras(16)[0]
+    dark = session.image(camera)
+    session.ambient = torch.ones(3)
+    assert torch.equal(session.image(camera), dark)
 
 
 def test_a_refit_keeps_what_its_answer_was_weighed_against(session: Session) -> None:

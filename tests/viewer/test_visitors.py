@@ -20,6 +20,8 @@ viser = pytest.importorskip("viser")
 import zstandard  # noqa: E402  # viser brings both
 from websockets.sync.client import ClientConnection, connect  # noqa: E402
 
+from rgspipe.viewer.page import Page  # noqa: E402
+
 NAN = float("nan")
 
 #: First messages of cameras that cannot be.
@@ -176,3 +178,24 @@ def test_thirty_visitors_who_leave_at_once_leave_no_thread(viewer: Viewer) -> No
         browser.send(message())
         wait_for(lambda: viewer.pages)
     wait_for(lambda: not viewer.pages and not threads())
+
+
+def test_a_viewer_that_ends_waits_for_pages_that_are_being_furnished(
+    frozen: FrozenScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    furnish, entered, furnished = Page.furnish, threading.Event(), threading.Event()
+
+    def slowly(page: Page) -> None:
+        entered.set()
+        time.sleep(0.3)
+        furnish(page)
+        furnished.set()
+
+    monkeypatch.setattr(Page, "furnish", slowly)
+    brief = view(frozen, port=0, resolution=32)
+    with visitor(brief) as browser:
+        browser.send(message())
+        assert entered.wait(60.0)
+        brief.stop()
+    assert furnished.is_set()
+    wait_for(lambda: not threads())

@@ -59,7 +59,7 @@ def view_folder(arguments: Sequence[str]) -> int:
     """
     asked = parsed(arguments)
 
-    from rgspipe.datasets.light_file import read_lights
+    from rgspipe.datasets.light_file import read_ambient, read_lights
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.frozen_file import SURFELS
     from rgspipe.stages.lights.capture import found_capture
@@ -77,6 +77,9 @@ def view_folder(arguments: Sequence[str]) -> int:
     given += [] if asked.fit is None else [Path(asked.fit) / "lights.json"]
     for line in filter(None, (elsewhere_line(file, Path(asked.folder) / SURFELS) for file in given)):
         print(line)
+    unknowns = {} if found is None else found.unknowns
+    if asked.lights is not None and (ambient := read_ambient(asked.lights)) is not None:
+        unknowns["ambient"] = ambient
     case = Case(found=found) if asked.target is None else case_in(asked.target, found, found_capture)
     viewer = view(
         FrozenScene.load(asked.folder).to(device),
@@ -86,7 +89,7 @@ def view_folder(arguments: Sequence[str]) -> int:
         resolution=asked.resolution,
         address=asked.address,
         world=world_of(1.0, origin_of(asked.folder / SURFELS)),
-        **({} if found is None else found.unknowns),
+        **unknowns,
     )
     return serve(viewer, asked.port, asked.browser)
 

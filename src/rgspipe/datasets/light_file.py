@@ -89,6 +89,11 @@ def read_ambient(path: str | Path) -> Tensor | None:
     return torch.tensor(radiance, dtype=torch.float64)
 
 
+def ambient_fields(radiance: Tensor | None) -> dict:
+    """Of a light file, what `read_ambient` reads from it: (3,) radiance; nothing of None."""
+    return {} if radiance is None else {AMBIENT: {RADIANCE: radiance.tolist()}}
+
+
 def write_lights(path: str | Path, lights: Light | Sequence[Light], extra: dict | None = None) -> None:
     """Write lights; `extra` holds further top-level fields, its "lights" a list of further fields per light.
 

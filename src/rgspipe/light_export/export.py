@@ -10,7 +10,7 @@ from typing import get_args
 from torch import Tensor
 
 from rgspipe.arguments import as_path, as_several
-from rgspipe.datasets.light_file import AMBIENT, RADIANCE, WORLD, write_lights
+from rgspipe.datasets.light_file import WORLD, ambient_fields, write_lights
 from rgspipe.errors import InputError
 from rgspipe.light_export.blend import blend
 from rgspipe.light_export.gltf import gltf
@@ -98,8 +98,7 @@ def export_lights(
     for path, text, _ in made:
         if text is None:
             moved = {} if world == World() else {WORLD: asdict(world)}
-            around = {} if ambient is None else {AMBIENT: {RADIANCE: ambient.tolist()}}
-            write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"} | moved | around)
+            write_lights(path, rig, {"units": "metres, W/sr; of suns W/m²"} | moved | ambient_fields(ambient))
         else:
             write_text(path, text)
     notes = [*notes, *(note for _, _, said in made for note in said), *_lost(rig, {*formats})]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
+from functools import cached_property, partial
 from typing import Literal
 
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.ambient import ambient_image
+from rgspipe.renderer.ambient import ambient_radiance
 from rgspipe.renderer.effects import ALL_EFFECTS
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.model import Lit, SurfelModel, ViewModel
@@ -29,16 +30,21 @@ Quality = Literal["coarse", "soft", "sharp"]
 #: at 512²): 400 MB. Lamps whose light on the surfels is kept, 12 bytes a surfel.
 IMAGE_PIXELS, VIEW_PIXELS, LIT = 2**24, 2**21, 16
 
+#: Names what comes from all around, among lamps.
+VOID = "void"
+
 #: Of an albedo below this the radiance does not tell what arrives.
 BLACK = 1e-3
 
 
 class LampImages:
-    """Images of a scene, each a sum over lamps.
+    """Images of a scene, each a sum over lamps, and over what comes from all around through openings.
 
     An image is linear in every lamp's intensity: with U_l what a camera sees of lamp l at 1 W/sr, it is Σ_l I_l U_l. So
     a change of colour or power renders nothing, and of several lamps only the one that moves is rendered. What a lamp
     makes of the surfels is the same from everywhere, so that a camera that moves is only traced.
+
+    Methods take `ambient`, the radiance (3,) that comes from all around; None for black.
 
     Args:
         frozen: the scene.
@@ -51,20 +57,23 @@ class LampImages:
         self._models: Kept[ViewModel] = Kept(VIEW_PIXELS, lambda model: len(model.views.pixels))
         self._lit: Kept[Lit] = Kept(LIT)
         self._onto: Kept[Tensor] = Kept(LIT)
-        self._ambient: Kept[Tensor] = Kept(LIT)
 
     def knows(self, camera: Camera) -> bool:
         """Whether the camera was traced already for images that are not coarse."""
         return (camera.key, False) in self._weights
 
-    def image(self, camera: Camera, rig: LightRig, quality: Quality = "sharp") -> Tensor:
-        """(H, W, 3) linear radiance under `rig`, black without lamps."""
+    def image(self, camera: Camera, rig: LightRig, quality: Quality = "sharp", ambient: Tensor | None = None) -> Tensor:
+        """(H, W, 3) linear radiance, black without any light."""
         image = torch.zeros(camera.height, camera.width, 3)
         for light in rig:
             image += light.intensity.float() * self._unit_image(camera, light, quality)
+        if ambient is not None and self._void_lit is not None:
+            image += ambient.to(image) * self._view(camera, quality == "coarse").image(self._void_lit).cpu()
         return image
 
-    def irradiance(self, camera: Camera, rig: LightRig, quality: Quality = "soft") -> Tensor:
+    def irradiance(
+        self, camera: Camera, rig: LightRig, quality: Quality = "soft", ambient: Tensor | None = None
+    ) -> Tensor:
         """(H, W, 3) what arrives on the surfaces that a camera sees, with all bounces, W per square scene unit.
 
         The radiance of diffuse surfels times π over their albedo, or what arrives on those that are black; 0 where
@@ -73,34 +82,43 @@ class LampImages:
         model, albedo = self._model(camera, "coarse" if quality == "coarse" else "soft"), self.frozen.surfels.albedo
         arriving = torch.zeros_like(albedo)
         for light in rig:
-            arriving += light.intensity.to(albedo) * self._arriving(self._lit_by(model, _white(light)), _white(light))
+            white = _white(light)
+            direct = partial(rig_irradiance, self.frozen.bvh, (white,))
+            arriving += light.intensity.to(albedo) * self._arriving(_told(white), self._lit_by(model, white), direct)
+        if ambient is not None and self._void_lit is not None:
+            arriving += ambient.to(albedo) * self._arriving(VOID, self._void_lit, self._direct_void)
         return (model.views.operator @ arriving).reshape(camera.height, camera.width, 3).cpu()
 
-    def ambient(self, camera: Camera) -> Tensor:
-        """(H, W, 3) what a camera sees under radiance 1 from all around, through openings; black in a closed scene."""
-        return self._ambient.get(camera.key, lambda: ambient_image(self.frozen, self._view(camera, False)).cpu())
+    @cached_property
+    def _void_lit(self) -> Tensor | None:
+        """(N, 3) radiance under a void of radiance 1; None in a closed scene."""
+        with torch.no_grad():
+            return ambient_radiance(self.frozen)
 
-    def _arriving(self, lit: Lit, light: Light) -> Tensor:
-        """(N, 3) irradiance of the surfels that a lamp has `lit`."""
+    def _direct_void(self) -> Tensor:
+        return self.frozen.void_irradiance[:, None].expand(-1, 3)
+
+    def _arriving(self, source: Hashable, lit: Lit, direct: Callable[[], Tensor]) -> Tensor:
+        """(N, 3) irradiance of the surfels that a source has `lit`, whose own light on them is `direct`."""
         albedo = self.frozen.surfels.albedo
         arriving = (lit if isinstance(lit, Tensor) else lit.radiance) * math.pi / albedo.clamp(min=BLACK)
         black = albedo < BLACK
         if not bool(black.any()):
             return arriving
-        return torch.where(black, self._onto.get(_told(light), lambda: self._gathered(lit, light)), arriving)
+        return torch.where(black, self._onto.get(source, lambda: self._gathered(lit, direct)), arriving)
 
-    def _gathered(self, lit: Lit, light: Light) -> Tensor:
-        """(N, 3) the same before any of it is reflected: from the lamp, and from other surfels."""
+    def _gathered(self, lit: Lit, direct: Callable[[], Tensor]) -> Tensor:
+        """(N, 3) the same before any of it is reflected: from the source, and from other surfels."""
         transport = self.frozen.transport
         with torch.no_grad():
-            direct = rig_irradiance(self.frozen.bvh, (light,))
-            sent = (self.frozen.surfels.albedo * direct / math.pi)[..., None]
+            first = direct()
+            sent = (self.frozen.surfels.albedo * first / math.pi)[..., None]
             if isinstance(lit, Tensor):
                 received = transport.gathered(sent)
             else:
                 highlights = lit.transport.highlights(lit.towards, lit.irradiance).sum(dim=0)[..., None]
                 received, _ = lit.transport.received(transport, sent, highlights)
-            return direct + math.pi * received[..., 0]
+            return first + math.pi * received[..., 0]
 
     def _unit_image(self, camera: Camera, light: Light, quality: Quality) -> Tensor:
         white = _white(light)

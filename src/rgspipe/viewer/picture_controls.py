@@ -39,10 +39,13 @@ class PictureControls:
             "section at", 0.0, 1.0, 0.01, 0.5, hint="From the lower to the upper end. Keys 6, 7."
         )
         self._place.visible = False
+        self._around = gui.add_checkbox(
+            "light from all around", True, hint="What comes through openings, beside the lamps.", visible=False
+        )
         self._scale = gui.add_image(scale(), visible=False)
         self._legend = gui.add_markdown("")
         self._dark = gui.add_checkbox("dark page", True, hint="Of the page around the picture. Key 0.")
-        for field in (self._exposure, self._shown, self._section, self._place):
+        for field in (self._exposure, self._shown, self._section, self._place, self._around):
             visit.actions.field(field, self._read)
         visit.actions.field(self._dark, self._paint_page)
         actions = (
@@ -57,8 +60,8 @@ class PictureControls:
         visit.actions.keys(*actions)
 
     def tell(self, top: float) -> None:
-        """What the brightest colour of the picture stands for."""
-        shown = self._session.shown
+        """What the brightest colour of the picture stands for; whether there is more than lamps in it."""
+        shown, self._around.visible = self._session.shown, self._session.ambient is not None
         unit = "W/(sr·m²)" if shown == PICTURE else shown.rpartition(" ")[2]
         self._legend.content = f"Brightest colour: {top:.3g} {unit}."
         self._scale.visible = shown != PICTURE
@@ -89,6 +92,7 @@ class PictureControls:
     def _read(self) -> None:
         session, axis = self._session, SECTIONS.index(self._section.value) - 1
         session.exposure, session.shown = self._exposure.value, self._shown.value
+        session.is_open_to_it = self._around.value
         self._place.visible = axis >= 0
         lower, upper = (corner.double() for corner in session.images.frozen.bounds)
         session.section = None

@@ -44,9 +44,8 @@ class Saving:
             self._send("lights.json", path.read_bytes())
 
     def _export(self) -> None:
-        found = self._session.found
-        ambient = None if found is None else found.ambient
-        self._send("lamps.zip", exported(self._session.lights, self._visit.exhibit.world, ambient))
+        session = self._session
+        self._send("lamps.zip", exported(session.lights, self._visit.exhibit.world, session.ambient))
 
     def _still(self) -> None:
         if (camera := self._visit.camera()) is not None:

@@ -14,6 +14,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import torch
+from torch import Tensor
 
 from rgspipe.errors import InputError
 from rgspipe.light_export.world import World
@@ -51,7 +52,7 @@ class Viewer:
         from rgspipe.viewer.picture_controls import theme
 
         self.pages: dict[int, Page] = {}
-        self._exhibit = exhibit
+        self._exhibit, self._door, self._is_closed = exhibit, threading.Lock(), False
         # Both say where they listen, which is another address than that which others are given.
         logging.getLogger("websockets").setLevel(logging.WARNING)
         # Who leaves does not wait for the picture in the making.
@@ -90,10 +91,12 @@ class Viewer:
         """End the server and all pages."""
         if self._relay is not None:
             self._relay.stop()
-        for page in list(self.pages.values()):
-            page.leave()
-        with _unsaid():
-            self._server.stop()
+        with self._door:  # A page that is being furnished could not say so to a server that is gone.
+            self._is_closed = True
+            for page in list(self.pages.values()):
+                page.leave()
+            with _unsaid():
+                self._server.stop()
 
     def _begin_at(self, camera: Camera) -> None:
         """Have browsers begin there: what they tell before they are moved would be the first picture's place."""
@@ -105,12 +108,15 @@ class Viewer:
     def _welcome(self, client) -> None:
         from rgspipe.viewer.page import Page
 
-        page = self.pages[client.client_id] = Page(client, self._exhibit, self._is_phone(client.client_id))
-        try:
-            page.furnish()
-        finally:
-            if client.client_id not in self._server.get_clients():  # left meanwhile
-                self._bye(client)
+        with self._door:
+            if self._is_closed:
+                return
+            page = self.pages[client.client_id] = Page(client, self._exhibit, self._is_phone(client.client_id))
+            try:
+                page.furnish()
+            finally:
+                if client.client_id not in self._server.get_clients():  # left meanwhile
+                    self._bye(client)
 
     def _is_phone(self, number: int) -> bool:
         """Whether the browser says that it is one's; viser 1.1.1 keeps its request without a door to it."""
@@ -158,7 +164,7 @@ def view(
     world: World | None = None,
     exposure_free: bool = False,
     base_scale_free: bool = False,
-    ambient: bool = False,
+    ambient: bool | Tensor | None = False,
 ) -> Viewer:
     """Show a scene in the browser, at 127.0.0.1 only; returns at once.
 
@@ -175,7 +181,8 @@ def view(
         world: how scene units came about, for lamps that are exported; metres if None.
         exposure_free: whether every photograph but the first has an unknown exposure.
         base_scale_free: whether images with the lamps off are in photographs an unknown number of times.
-        ambient: whether searches allow for light from all around through openings besides.
+        ambient: whether searches allow for light from all around through openings besides; they do where (3,) radiance
+            of it is given, as `read_ambient` has it, which goes with `lights`.
 
     Raises:
         InputError: viser is not installed, or an argument is not what it should be.
@@ -193,8 +200,10 @@ def view(
     taken = [photograph for case in cases for photograph in case.photographs]
     camera = camera or (taken[0].camera if taken else first_camera(*scene.bounds))
     is_open = address not in (LOOPBACK, "localhost")
-    images, finder = LampImages(scene), Finder(scene, exposure_free, base_scale_free, ambient)
-    exhibit = Exhibit(images, finder, camera, rig, tuple(cases), tuple(references), resolution, world or World())
+    around = ambient.double().cpu() if isinstance(ambient, Tensor) else None
+    finder = Finder(scene, exposure_free, base_scale_free, around is not None or bool(ambient))
+    every, known = tuple(cases), tuple(references)
+    exhibit = Exhibit(LampImages(scene), finder, camera, rig, around, every, known, resolution, world or World())
     viewer = Viewer(exhibit, 0 if is_open else port)
     if is_open:
         try:

@@ -11,7 +11,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from rgspipe.datasets.light_file import write_lights
+from rgspipe.datasets.light_file import ambient_fields, write_lights
 from rgspipe.evaluation.images import Bytes, beside, display_gain, save_png, signed_difference, tone_map
 from rgspipe.fitting import FitResult
 from rgspipe.light_export.world import LUMENS_PER_WATT, LUMINANCE
@@ -46,6 +46,8 @@ class Session:
     Attributes:
         images: of the scene.
         lights: the lamps that are on.
+        ambient: (3,) radiance that comes from all around through openings besides; black if None.
+        is_open_to_it: whether pictures for the screen have that; photographs do.
         case: photographs of the scene under lamps that are looked for.
         exposure: stops; at 0 the 97th percentile of the first photograph, or else of the first picture, is white.
         shown: one of SHOWN.
@@ -56,6 +58,8 @@ class Session:
 
     images: LampImages
     lights: LightRig = ()
+    ambient: Tensor | None = None
+    is_open_to_it: bool = True
     case: Case = field(default_factory=Case)
     exposure: float = 0.0
     shown: str = PICTURE
@@ -125,7 +129,7 @@ class Session:
     def image(self, camera: Camera, quality: Quality = "sharp") -> Tensor:
         """(H, W, 3) linear radiance, or irradiance where that is shown."""
         render = self.images.image if self.shown == PICTURE else self.images.irradiance
-        return render(camera, self.lights, quality)
+        return render(camera, self.lights, quality, self.ambient if self.is_open_to_it else None)
 
     def picture(self, camera: Camera, quality: Quality = "sharp") -> tuple[Bytes, float]:
         """(H, W, 3) uint8 for the screen; and what its brightest colour stands for."""
@@ -147,7 +151,7 @@ class Session:
     def photograph(self, camera: Camera) -> Photograph:
         """Keep what a camera sees now; the lamps of now are the truth, and others' photographs are dropped."""
         kept = self.case.photographs if same_lights(self.case.truth, self.lights) else ()
-        image = self.images.image(camera, self.lights, "sharp")
+        image = self.images.image(camera, self.lights, "sharp", self.ambient)
         taken = Photograph(f"photograph {len(kept)}", camera, image)
         self.case = Case("taken here", (*kept, taken), self.lights)
         return taken
@@ -159,10 +163,9 @@ class Session:
         that was found and clipped where the photograph is. What the photograph shows with the lamps off is in it, and
         what was found to come from all around.
         """
-        rig = self.lights if photograph.lights is None else photograph.lights
-        now, factor = self.images.image(photograph.camera, rig, "sharp"), display_gain(photograph.image)
-        if photograph.lights is None and self.found is not None and self.found.ambient is not None:
-            now = now + self.found.ambient.to(now) * self.images.ambient(photograph.camera)
+        own = photograph.lights
+        rig, ambient = (self.lights, self.ambient) if own is None else (own, None)
+        now, factor = self.images.image(photograph.camera, rig, "sharp", ambient), display_gain(photograph.image)
         now = self._exposure_of(photograph) * now
         if photograph.base is not None:
             scale = None if self.found is None else self.found.base_scale
@@ -183,6 +186,7 @@ class Session:
         if case.photographs:
             self._gain = display_gain(case.photographs[0].image)
         if case.found is not None:
+            self.ambient = case.found.ambient
             self.change(case.found.lights)
 
     def take(self, result: FitResult, searched: bool = True) -> None:
@@ -195,12 +199,12 @@ class Session:
         found, before = Found.of(result), self.found
         if not searched and before is not None and alike(found.lights, before.lights, SAME * self.images.frozen.size):
             found = replace(found, alternatives=before.alternatives, costs=before.costs)
-        self.found = found
+        self.found, self.ambient = found, found.ambient
         self.change(result.lights)
 
     def save(self, path: str | Path) -> None:
         """Write a light file."""
-        write_lights(path, self.lights)
+        write_lights(path, self.lights, ambient_fields(self.ambient))
 
     def save_still(self, path: str | Path, camera: Camera) -> None:
         """Write the sharp picture as PNG."""

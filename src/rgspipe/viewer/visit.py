@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from torch import Tensor
+
 from rgspipe.light_export.world import World
 from rgspipe.scene import Camera, LightRig
 from rgspipe.viewer.lamp_images import LampImages
@@ -29,6 +31,7 @@ class Exhibit:
         finder: searches.
         camera: where the first picture is taken from.
         lights: the lamps at first; if None those of the first case's fit, or one above the middle.
+        ambient: (3,) radiance that comes from all around besides `lights`; black if None.
         cases: photographs that can be opened.
         references: photographs under lamps that are known.
         resolution: pixels along the longer side of pictures at rest.
@@ -40,6 +43,7 @@ class Exhibit:
     finder: Finder
     camera: Camera
     lights: LightRig | None = None
+    ambient: Tensor | None = None
     cases: Sequence[Case] = ()
     references: Sequence[Photograph] = ()
     resolution: int = 256
@@ -51,7 +55,8 @@ class Exhibit:
         session = Session(self.images)
         if self.cases:
             session.open(self.cases[0])
-        session.lights = session.lights if self.lights is None else self.lights
+        if self.lights is not None:
+            session.lights, session.ambient = self.lights, self.ambient
         if not session.lights:
             session.add()
         session.forget()

@@ -14,7 +14,7 @@ from torch import Tensor
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.exr import write_image
 from rgspipe.datasets.gs3 import load_target
-from rgspipe.datasets.light_file import AMBIENT, RADIANCE, write_lights
+from rgspipe.datasets.light_file import ambient_fields, write_lights
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
@@ -97,8 +97,7 @@ class Relighter:
         arrays = [image.numpy() for image in images]
         for (index, _), array in zip(views, arrays, strict=True):
             write_image(image_path(folder, name, index), array)
-        more = None if ambient is None else {AMBIENT: {RADIANCE: ambient.tolist()}}
-        write_lights(folder / "lights" / f"{name}.json", rig, more)
+        write_lights(folder / "lights" / f"{name}.json", rig, ambient_fields(ambient))
         known = {"rig": name, "lights": len(rig)}
         rows = [known | {"view": index, "milliseconds": 1e3 * seconds / len(views)} for index, _ in views]
         return rows, arrays
