@@ -174,6 +174,7 @@ def test_a_choice_is_explained(topic: str) -> None:
     [
         (["stage=fit_ligth"], "stage=fit_light"),
         (["stage=freeze", "dataset.resolutoin=3"], "dataset.resolution"),
+        (["stage=freeze", "dry_run=true"], "Did you mean --dry-run?"),
         (["-m", "stage=freeze", "seed=1,x"], "seed"),
         (["pipeline=smok"], "pipeline=smoke"),
         (["--help", "fot"], "fit"),

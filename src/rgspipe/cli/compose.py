@@ -20,6 +20,7 @@ from hydra.errors import HydraException, MissingConfigException, OverrideParseEx
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from rgspipe.cli import DRY_RUN
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.hydra_settings import check_hydra
 from rgspipe.cli.sweep_values import check_jobs, first_value, job_overrides, single_jobs
@@ -211,7 +212,12 @@ def _check_keys(overrides: Sequence[Override]) -> None:
                 f"~{key}", expected="key=value", found="a deletion", remedy=f"Set {key} instead: no key can go."
             )
         if (override.is_add() or override.is_force_add()) and not key.startswith(FREE_SECTIONS) and key not in known:
-            raise unknown_key(key, known)
+            raise _unknown(key, known)
+
+
+def _unknown(key: str, known: Sequence[str]) -> InputError:
+    """Of a key that may be an option's name, too."""
+    return unknown_key(key, [*known, DRY_RUN])
 
 
 def _known_keys(overrides: Sequence[Override]) -> list[str]:
@@ -267,7 +273,7 @@ def _composition_error(error: Exception, overrides: Sequence[str]) -> InputError
     known = _known_keys(_parse(overrides))
     for override in _parse(overrides):
         if override.key_or_group not in known and not override.key_or_group.startswith(FREE_SECTIONS):
-            return unknown_key(override.key_or_group or repr(override.input_line), known)
+            return _unknown(override.key_or_group or repr(override.input_line), known)
     return InputError(
         "the command line",
         expected="overrides that fit the configuration",

@@ -29,7 +29,7 @@ KINDS = {
         "The lights that fits look for, in the frozen scene, beside the targets' own images: what is left between them "
         "is what a perfect fit would leave. Each column is the image with the median PSNR.",
     ),
-    "rig": ("In other lights", "One rig, seen by every camera; all pictures are exposed alike."),
+    "rig": ("In other lights", "One rig, seen by each camera that was asked for; all pictures are exposed alike."),
     "aim": ("A spot that turns", "A spot stays at its place while its axis sweeps over the scene."),
     "orbit": ("A spot that goes around", "A spot goes once around the scene's middle, aimed at it."),
 }
