@@ -67,3 +67,12 @@ def test_who_has_the_token_may_come_from_elsewhere(frozen: FrozenScene) -> None:
         assert answer(open_to_all.rsplit("/", 2)[0] + "/wrong/", None) == 403
     finally:
         viewer.stop()
+
+
+def test_light_from_all_around_is_given_as_radiance(frozen: FrozenScene) -> None:
+    shown = view(frozen, port=0, ambient=[0.1, 0.2, 0.3])
+    shown.stop()
+    session = shown._exhibit.session()
+    assert session.ambient.tolist() == [0.1, 0.2, 0.3] and shown._exhibit.finder._ambient
+    with pytest.raises(InputError, match="ambient"):
+        view(frozen, port=0, ambient=[0.1, 0.2])

@@ -277,7 +277,7 @@ def test_on_black_surfaces_light_from_all_around_is_what_arrives_there() -> None
     albedo[1::2, 0] = albedo[1::2, 1]
     dyed = FrozenScene.freeze(replace(room.surfels, albedo=albedo), gather_rays=64, patches=150, seed=0)
     seen = LampImages(dyed).irradiance(camera, (), "soft", torch.ones(3))
-    torch.testing.assert_close(seen[..., 0], seen[..., 1], rtol=0.01, atol=1e-3)
+    torch.testing.assert_close(seen[..., 0], seen[..., 1], rtol=0.01, atol=1e-3)  # 0.0005 of 0.85 in the mean
 
 
 def test_a_closed_room_shows_nothing_of_what_is_around_it(session: Session) -> None:

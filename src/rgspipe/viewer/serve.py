@@ -14,12 +14,12 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import torch
-from torch import Tensor
 
 from rgspipe.errors import InputError
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera
+from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.lights import Light, as_rig
 from rgspipe.viewer.cameras import first_camera, pose_of
 from rgspipe.viewer.lamp_images import LampImages
@@ -164,7 +164,7 @@ def view(
     world: World | None = None,
     exposure_free: bool = False,
     base_scale_free: bool = False,
-    ambient: bool | Tensor | None = False,
+    ambient: ArrayLike | None = False,
 ) -> Viewer:
     """Show a scene in the browser, at 127.0.0.1 only; returns at once.
 
@@ -182,7 +182,7 @@ def view(
         exposure_free: whether every photograph but the first has an unknown exposure.
         base_scale_free: whether images with the lamps off are in photographs an unknown number of times.
         ambient: whether searches allow for light from all around through openings besides; they do where (3,) radiance
-            of it is given, as `read_ambient` has it, which goes with `lights`.
+            of it is given, as `read_ambient` has it, which pictures then begin with.
 
     Raises:
         InputError: viser is not installed, or an argument is not what it should be.
@@ -200,8 +200,10 @@ def view(
     taken = [photograph for case in cases for photograph in case.photographs]
     camera = camera or (taken[0].camera if taken else first_camera(*scene.bounds))
     is_open = address not in (LOOPBACK, "localhost")
-    around = ambient.double().cpu() if isinstance(ambient, Tensor) else None
-    finder = Finder(scene, exposure_free, base_scale_free, around is not None or bool(ambient))
+    around = None
+    if not isinstance(ambient, bool | None):
+        around = as_tensor(ambient, "ambient", (3,), torch.float64, "rg.read_ambient(FILE) reads it.").detach().cpu()
+    finder = Finder(scene, exposure_free, base_scale_free, around is not None or ambient is True)
     every, known = tuple(cases), tuple(references)
     exhibit = Exhibit(LampImages(scene), finder, camera, rig, around, every, known, resolution, world or World())
     viewer = Viewer(exhibit, 0 if is_open else port)

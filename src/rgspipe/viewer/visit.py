@@ -31,7 +31,7 @@ class Exhibit:
         finder: searches.
         camera: where the first picture is taken from.
         lights: the lamps at first; if None those of the first case's fit, or one above the middle.
-        ambient: (3,) radiance that comes from all around besides `lights`; black if None.
+        ambient: (3,) radiance that comes from all around at first; if None, that of the fit whose lamps are shown.
         cases: photographs that can be opened.
         references: photographs under lamps that are known.
         resolution: pixels along the longer side of pictures at rest.
@@ -56,7 +56,9 @@ class Exhibit:
         if self.cases:
             session.open(self.cases[0])
         if self.lights is not None:
-            session.lights, session.ambient = self.lights, self.ambient
+            session.lights, session.ambient = self.lights, None
+        if self.ambient is not None:
+            session.ambient = self.ambient
         if not session.lights:
             session.add()
         session.forget()
