@@ -86,8 +86,8 @@ class SeenSpace:
         """What is seen past the surfaces, both of whose sides end a ray.
 
         Args:
-            depths: of each camera the depth (H, W) of its photograph if it is known. A place that has no surfel, as
-                one camera alone saw it aslant, is no hole.
+            depths: of each camera the depth (H, W) of its photograph if it is known, at which rays end as well: a place
+                that has no surfel, as one camera alone saw it aslant, is no hole.
         """
         reduced = tuple(camera.reduced(LONGEST_SIDE) for camera in cameras)
         known = depths or [None] * len(reduced)
@@ -147,11 +147,11 @@ def _reach(bvh: SurfelBvh, camera: Camera, depth: Tensor | None) -> Tensor:
     hits = composite(bvh, origins, directions, two_sided=True)
     covered = hits.weights.sum(dim=1)
     mean = (hits.weights * hits.depths.nan_to_num(posinf=0.0)).sum(dim=1) / covered.clamp(min=1e-6)
-    nowhere = torch.full_like(mean.double(), torch.inf)
+    reach = torch.where(hits.transmittance < 0.5, mean.double(), torch.inf)
     if depth is not None:
         measured = lengths.double().reshape(-1) * _sampled(depth.double(), camera)
-        nowhere = torch.where(measured.isfinite(), measured, nowhere.to(measured.device))
-    return torch.where(hits.transmittance < 0.5, mean.double(), nowhere.to(mean.device)).cpu()
+        reach = torch.minimum(reach, torch.where(measured.isfinite(), measured, torch.inf).to(reach.device))
+    return reach.cpu()
 
 
 def _sampled(depth: Tensor, camera: Camera) -> Tensor:

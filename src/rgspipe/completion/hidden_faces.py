@@ -81,10 +81,13 @@ class _WayBack:
         steps = np.arange(0.5, np.linalg.norm((grid.upper - grid.lower).numpy()) / spacing) * spacing
         places = (edge.places[:, None] + steps[:, None] * edge.inward).reshape(-1, 3)
         others = np.delete(centers, edge.sheet.plane.members.numpy(), axis=0)
-        met = ~grid.contains(places) | are_near(others, places, BARE * spacing)
-        behind = torch.from_numpy(places - BEYOND * spacing * edge.outward)
+        inside = grid.contains(places)
+        met = ~inside | are_near(others, places, BARE * spacing)
+        behind = torch.from_numpy(places[inside] - BEYOND * spacing * edge.outward)
         # Cameras nearly in line with the face see past the edge in pixels that cover more than that.
-        seen_through = space.holds(behind, 0.0, around=True).numpy().reshape(len(edge.places), len(steps))
+        seen_through = np.zeros(len(places), dtype=bool)
+        seen_through[inside] = space.holds(behind, 0.0, around=True).numpy()
+        seen_through = seen_through.reshape(len(edge.places), len(steps))
         # Rays that graze the edge are taken to pass behind it.
         return cls(edge, places, met.reshape(seen_through.shape), seen_through & (steps > GRAZED * spacing))
 

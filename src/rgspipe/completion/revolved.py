@@ -1,8 +1,8 @@
-"""What round things become where no camera looked: they go all the way around.
+"""Things of revolution of which a side was seen.
 
-Balls, drums, vases and lamps are surfaces of revolution, most about an axis that is one of the room's. All normals of
-one lie in planes through its axis, so that a few surfels tell where this is; and what was seen at a height tells the
-radius there. If that is as in a ball, so is all the rest.
+Drums, vases and lamps are surfaces of revolution, most about an axis that is one of the room's. All normals of one lie
+in planes through its axis, so that a few surfels tell where this is; and what was seen at a height tells the radius
+there.
 """
 
 from __future__ import annotations
@@ -11,13 +11,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from rgspipe.completion.free_space import SeenSpace
-from rgspipe.completion.rasters import BARE, BEYOND, Continued, are_near
+from rgspipe.completion.rasters import Continued
 
 #: Surfels from which an axis is tried at once, and so many others near each, up to so many distances away.
 TRIED, PARTNERS, FAR = 128, 4, 8.0
@@ -70,35 +68,6 @@ class Revolved:
             places = np.hstack([self.axis + radius * ring, height * level])
             parts.append(Continued(places, np.hstack([out * ring, up * level])))
         return Continued.joined(parts)
-
-
-def gone_around(
-    centers: np.ndarray, normals: np.ndarray, space: SeenSpace, spacing: float
-) -> tuple[Continued, np.ndarray]:
-    """The parts that nobody saw of all round things, and the surfels (M,) of these.
-
-    Things that cameras looked through more than they saw of them are none.
-
-    Args:
-        centers, normals: (N, 3) of surfels, along the axes of their room.
-        space: what cameras looked through.
-    """
-    parts, rest = [], np.arange(len(centers))
-    # Things that stand first; a ball is found with any axis.
-    for turn in (0, 1, 2):
-        order = np.roll(np.arange(3), turn)
-        back = np.argsort(order)
-        of_turn = rest
-        for thing in things_of_revolution(centers[of_turn][:, order], normals[of_turn][:, order], spacing):
-            whole = thing.all_around(spacing)
-            whole = Continued(whole.places[:, back], whole.normals[:, back])
-            seen = are_near(centers, whole.places, BARE * spacing)
-            behind = torch.from_numpy(whole.places - BEYOND * spacing * whole.normals)
-            crossed = space.holds(behind, 0.0).numpy() & ~seen
-            if seen.sum() > crossed.sum():
-                parts.append(whole.chosen(~seen & ~crossed))
-                rest = np.setdiff1d(rest, of_turn[thing.members])
-    return Continued.joined(parts), np.setdiff1d(np.arange(len(centers)), rest)
 
 
 def things_of_revolution(centers: np.ndarray, normals: np.ndarray, spacing: float) -> list[Revolved]:
@@ -215,8 +184,6 @@ def _profiled(
     known = np.unique(level)
     radii = np.interp(np.arange(len(levels)), known, [np.median(radius[level == one]) for one in known])
     kept = np.abs(radius - radii[level]) < OFF * spacing
-    if (ball := _ball(centers[members[kept]], normals[members[kept]], axis, spacing)) is not None:
-        return Revolved(axis, members[kept], *ball)
     # What touches a thing stands on one side of it.
     _, sector = _around(centers[members], normals[members], axis, np.inf)
     sectors = np.array([len(np.unique(sector[kept & (level == one)])) for one in range(len(levels))])
@@ -226,23 +193,3 @@ def _profiled(
     slopes = np.stack([np.ones(len(levels)), -slope], axis=1)
     slopes /= np.linalg.norm(slopes, axis=1, keepdims=True)
     return Revolved(axis, members[kept], levels[first:last], radii[first:last], slopes[first:last])
-
-
-def _ball(
-    centers: np.ndarray, normals: np.ndarray, axis: np.ndarray, spacing: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Heights, radii and slopes of the ball about an axis that surfels lie on; None if they lie on none."""
-    radius, height = np.linalg.norm(centers[:, :2] - axis, axis=1), centers[:, 2]
-    # (radius² + height²) = 2 middle · height + (size² − middle²)
-    terms = np.stack([2.0 * height, np.ones(len(height))], axis=1)
-    middle, rest = np.linalg.lstsq(terms, radius**2 + height**2, rcond=None)[0]
-    if (size := rest + middle**2) <= 0.0:
-        return None
-    size = math.sqrt(size)
-    off = np.hypot(radius, height - middle) - size
-    facing = (normals[:, 2] * size - (height - middle)) / size
-    if np.median(np.abs(off)) > 0.5 * OFF * spacing or np.median(np.abs(facing)) > math.sin(ASKEW):
-        return None
-    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, max(4, round(np.pi * size / spacing)))[1:-1]
-    slopes = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return middle + size * slopes[:, 1], size * slopes[:, 0], slopes

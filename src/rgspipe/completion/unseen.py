@@ -24,7 +24,7 @@ from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
 from rgspipe.completion.planes import Plane, frame_of, planes_of
 from rgspipe.completion.rasters import BARE, Continued
-from rgspipe.completion.revolved import gone_around
+from rgspipe.completion.round_things import gone_around
 from rgspipe.completion.structure import continued
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.openness import openness
