@@ -146,3 +146,13 @@ def test_a_pixel_beside_an_edge_sees_past_it_and_the_rays_around_a_point_do_not(
     points = torch.tensor([[0.46, 1.0, 0.5], [0.51, 1.0, 0.5], [0.75, 1.0, 0.5]])
     assert space.holds(points, 0.0).tolist() == [True, True, True]
     assert space.holds(points, 0.0, around=True).tolist() == [False, True, True]
+
+
+def test_rays_end_at_surfels_or_at_the_photographs_depth_whichever_is_nearer() -> None:
+    """A wall at y = 1; a photograph has depth in front of it, behind it and none."""
+    wall = surfels_on(rectangle([-1.0, 1.0, -1.0], [3.0, 0.0, 0.0], [0.0, 0.0, 3.0], [0.5, 0.5, 0.5]), 3000)
+    camera = camera_at([0.5, 0.0, 0.5], [0.5, 1.0, 0.5], 9, 1.2)
+    places = torch.tensor([[0.5, y, 0.5] for y in (0.4, 0.6, 0.9, 1.1)])
+    for depth, seen in ((0.5, 1), (1.5, 3), (torch.inf, 3), (torch.nan, 3)):
+        space = SeenSpace.of(SurfelBvh(wall), [camera], [torch.full((9, 9), depth)])
+        assert space.holds(places, 0.0).tolist() == [index < seen for index in range(4)]

@@ -1,29 +1,16 @@
-"""Round things of which one side was seen."""
+"""Drums of which one side was seen."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
-from scipy.spatial import cKDTree
 
-from half_seen_room import camera_at, only, seen_by
-from rgspipe.completion import with_unseen_surfaces
 from rgspipe.completion.revolved import things_of_revolution
-from rgspipe.renderer.point_sets import fibonacci_directions
-from rgspipe.scene.rectangles import rectangle, solid_box, surfels_on
-from rgspipe.scene.surfels import quaternion_from_normal
+from rgspipe.scene.rectangles import solid_box, surfels_on
 
 #: Distance of surfels.
 SPACING = 0.03
-
-
-def ball(radius: float) -> tuple[torch.Tensor, torch.Tensor]:
-    """Places and normals on one about the origin."""
-    normals = fibonacci_directions(round(4.0 * np.pi * radius**2 / SPACING**2)).double()
-    return radius * normals, normals
 
 
 def drum(radius: float, height: float) -> tuple[torch.Tensor, torch.Tensor]:
@@ -36,41 +23,17 @@ def drum(radius: float, height: float) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_the_side_of_a_ball_or_drum_tells_its_axis_and_radius(seed: int) -> None:
+def test_the_side_of_a_drum_tells_its_axis_and_radius(seed: int) -> None:
     """From a third of it, with normals that are 3° off."""
     generator = torch.Generator().manual_seed(seed)
-    for shape in (ball(0.3), drum(0.25, 0.6)):
-        centers, normals = (part[shape[1][:, 0] > 0.5] for part in shape)
-        normals = torch.nn.functional.normalize(normals + 0.05 * torch.randn(normals.shape, generator=generator), dim=1)
-        (thing,) = things_of_revolution((centers + torch.tensor([1.0, 2.0, 0.5])).numpy(), normals.numpy(), SPACING)
-        radius = float(shape[0].norm(dim=1).min())
-        # Measured 0.0045, and 0.0034: a ninth of the distance of surfels.
-        assert np.abs(thing.axis - [1.0, 2.0]).max() < 0.01 and abs(float(thing.radii.max()) - radius) < 0.01
-        assert len(thing.members) > 0.98 * len(centers)  # measured 0.994
+    centers, normals = (part[drum(0.25, 0.6)[1][:, 0] > 0.5] for part in drum(0.25, 0.6))
+    normals = torch.nn.functional.normalize(normals + 0.05 * torch.randn(normals.shape, generator=generator), dim=1)
+    (thing,) = things_of_revolution((centers + torch.tensor([1.0, 2.0, 0.5])).numpy(), normals.numpy(), SPACING)
+    # Measured 0.0029 and 0.0027: a tenth of the distance of surfels.
+    assert np.abs(thing.axis - [1.0, 2.0]).max() < 0.01 and abs(float(thing.radii.max()) - 0.25) < 0.01
+    assert len(thing.members) > 0.98 * len(centers)  # measured 0.997
 
 
 def test_a_box_is_not_round() -> None:
     sides = surfels_on(solid_box([0.0, 0.0, 0.3], [0.6, 0.4, 0.6], [0.5] * 3, 0.3), 1500)
     assert not things_of_revolution(sides.centers.numpy(), sides.normals.numpy(), SPACING)
-
-
-def test_a_ball_in_the_open_gets_its_other_side() -> None:
-    """It lies on a floor, and all cameras stand on one side of it."""
-    places, normals = ball(0.3)
-    floor = surfels_on(
-        rectangle([-1.0, -1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.5] * 3), round(4.0 / SPACING**2)
-    )
-    whole = only(floor, torch.zeros(len(places), dtype=torch.int64))
-    whole = replace(whole, centers=places + torch.tensor([0.0, 0.0, 0.3]), rotations=quaternion_from_normal(normals))
-    scene = replace(floor, **{name: torch.cat([part, floor.tensors()[name]]) for name, part in whole.tensors().items()})
-    cameras = [camera_at([x, -1.8, z], [0.0, 0.0, 0.2], 64, 0.9) for x, z in ((-0.9, 0.9), (0.0, 1.3), (0.9, 0.7))]
-    seen = seen_by(cameras, scene)
-    closed = with_unseen_surfaces(seen, cameras)
-    added = closed.centers[len(seen) :]
-    added = added[added[:, 2] > 0.01]
-    back = whole.centers[(whole.centers[:, 1] > 0.1) & (whole.centers[:, 2] > 0.1)]
-    before, after = (cKDTree(one.centers.numpy()).query(back.numpy())[0] / SPACING for one in (seen, closed))
-    off = cKDTree(scene.centers.numpy()).query(added.numpy())[0] / SPACING
-    assert float(np.median(before)) > 5.0  # measured 5.73
-    assert float(np.quantile(after, 0.9)) < 0.7 and float(np.quantile(off, 0.9)) < 0.7  # measured 0.57 and 0.56
-    assert float(off.max()) < 2.5  # measured 2.12

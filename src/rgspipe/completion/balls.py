@@ -1,7 +1,8 @@
 """Balls of which a part was seen.
 
-On a ball about m of radius R a place p and its normal n obey p = m + R n: linear in four unknowns, to which each surfel
-brings three equations. Places are known far better than normals, so each kind counts by its own variance.
+On a ball about m of radius R a place p and its normal n obey p = m + R n: four unknowns, of which each surfel tells by
+how far it is from m, and by where it faces. Places are known far better than normals, so each kind counts by its own
+variance.
 """
 
 from __future__ import annotations
@@ -29,8 +30,11 @@ FEWEST = 12
 #: Neighbours with which a surfel tells a ball, and how much of their squared distances it must explain.
 NEIGHBOURS, EXPLAINED = 8, 0.8
 
-#: Balls that are tried at once, rounds of fitting, and median of the square of a standard normal variable.
-TRIED, ROUNDS, MEDIAN = 128, 10, 0.455
+#: Balls that are tried at once, and rounds of fitting.
+TRIED, ROUNDS = 128, 10
+
+#: Medians of chi-squared with one degree of freedom and with two.
+MEDIAN, MEDIAN_OF_TWO = 0.455, 1.386
 
 
 @dataclass(frozen=True)
@@ -102,7 +106,8 @@ def _best(centers: np.ndarray, normals: np.ndarray, rest: np.ndarray, spacing: f
         # From the surfels around one the ball is known roughly: those near it tell it well.
         ball = ball_of(centers, normals, rest[on], spacing)
         if ball is not None:
-            whole = _lie_on(places, ways, ball.middle, ball.radius, OFF * spacing)
+            # Rough ones have surfels before and behind them, which are no further ball.
+            whole = _lie_on(places, ways, ball.middle, ball.radius, 2.0 * OFF * spacing)
             return Ball(ball.middle, ball.radius, rest[whole])
     return None
 
@@ -131,27 +136,27 @@ def _lie_on(places: np.ndarray, normals: np.ndarray, middle: np.ndarray, radius:
 
 
 def _fitted(places: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
-    """Middle (3,) and radius of the ball on which surfels lie, and the covariance (4, 4) of both."""
+    """Middle (3,) and radius of the ball on which surfels lie, and the covariance (4, 4) of both (Gauss-Newton)."""
     count = len(places)
-    unknowns = np.concatenate([np.broadcast_to(np.eye(3), (count, 3, 3)), normals[:, :, None]], axis=2)
-    solved = np.linalg.lstsq(unknowns.reshape(-1, 4), places.reshape(-1), rcond=None)[0]
+    linear = np.concatenate([np.broadcast_to(np.eye(3), (count, 3, 3)), normals[:, :, None]], axis=2)
+    solved = np.linalg.lstsq(linear.reshape(-1, 4), places.reshape(-1), rcond=None)[0]
     for _ in range(ROUNDS):
         outward = places - solved[:3]
-        outward /= np.linalg.norm(outward, axis=1, keepdims=True).clip(min=1e-12)
-        # Along the ball's normal a place tells it, and across the surfel's normal does.
+        distance = np.linalg.norm(outward, axis=1, keepdims=True).clip(min=1e-12)
+        outward /= distance
         across = np.eye(3) - outward[:, :, None] * outward[:, None]
-        own = np.column_stack([outward, np.ones(count)])
-        turned = np.concatenate([across, across @ normals[:, :, None]], axis=2)
-        seen, told = (outward * places).sum(axis=1), (across @ places[:, :, None])[:, :, 0]
-        off, askew = seen - own @ solved, told - turned @ solved
-        place, turn = np.median(off**2) / MEDIAN, np.median((askew**2).sum(axis=1)) / (2.0 * np.log(2.0))
-        least = 1e-12 * (solved[3] ** 2 + 1e-300)
-        place, turn = max(place, least), max(turn, least)
-        # Whatever is off by more than three deviations counts less (Huber).
-        heeded = np.minimum(1.0, 3.0 * np.sqrt(place) / np.abs(off).clip(min=1e-300))
-        matrix = (own * (heeded / place)[:, None]).T @ own + np.einsum("kia,kib->ab", turned, turned) / turn
-        right = (own * (heeded / place)[:, None]).T @ seen + np.einsum("kia,ki->a", turned, told) / turn
-        solved = np.linalg.solve(matrix, right)
+        off, askew = distance[:, 0] - solved[3], (across @ normals[:, :, None])[:, :, 0]
+        place = max(np.median(off**2) / MEDIAN, (1e-9 * solved[3]) ** 2)
+        turn = max(np.median((askew**2).sum(axis=1)) / MEDIAN_OF_TWO, 1e-18)
+        # A place that is off by more than three deviations counts less (Huber).
+        heeded = np.minimum(1.0, 3.0 * np.sqrt(place) / np.abs(off).clip(min=1e-300)) / place
+        of_place = -np.column_stack([outward, np.ones(count)])
+        of_normal = across / distance[:, :, None]
+        matrix = (of_place * heeded[:, None]).T @ of_place
+        matrix[:3, :3] += np.einsum("kia,kib->ab", of_normal, of_normal) / turn
+        right = (of_place * heeded[:, None]).T @ off
+        right[:3] += np.einsum("kia,ki->a", of_normal, askew) / turn
+        solved = solved - np.linalg.solve(matrix, right)
     return solved[:3], float(solved[3]), np.linalg.inv(matrix)
 
 
