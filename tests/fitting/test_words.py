@@ -11,6 +11,7 @@ import pytest
 from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.findings import (
     AtBound,
+    BehindSurfaces,
     Finding,
     FitStatus,
     LightMissing,
@@ -100,6 +101,8 @@ def test_lights_are_numbered_where_there_are_several() -> None:
     assert "the position of light 2 by 15 %" in explained([Uncertain(2, 2, 0.15)])
     assert "The light stands on a surface" in explained([OnSurface(1, 1)])
     assert "Light 3 stands on a surface" in explained([OnSurface(1, 3), OnSurface(3, 3)])
+    assert "Light 2 stands behind surfaces or inside" in explained([BehindSurfaces(2, 2, 0.002)])
+    assert "0.2 % of what one in the open would send" in explained([BehindSurfaces(1, 1, 0.002)])
     rough = RoughShape(1, 2, ("width", "turn"), (0.24, 3.0))
     assert "Hardly determined by these views: width (by 24 %) and turn (by 100 %) of light 1." in explained([rough])
     assert "axis and cone of light 2" in explained([Undetermined(2, 2, ("direction", "cone_angle"))])

@@ -67,29 +67,34 @@ class _WayBack:
         edge: of E places, from each of which it goes D steps.
         places: (E · D, 3).
         met: (E, D) bool, surfaces, or the end of the box.
+        across: (E, D) bool, surfaces that stand across a face there.
         seen_through: (E, D) bool, a camera saw something behind.
     """
 
     edge: _Edge
     places: np.ndarray
     met: np.ndarray
+    across: np.ndarray
     seen_through: np.ndarray
 
     @classmethod
-    def of(cls, edge: _Edge, centers: np.ndarray, grid: Grid, space: SeenSpace) -> _WayBack:
+    def of(cls, edge: _Edge, centers: np.ndarray, others: Continued, grid: Grid, space: SeenSpace) -> _WayBack:
+        """Among surfels at `centers` (N, 3), and `others` that are on other sheets or round."""
         spacing = edge.sheet.raster.spacing
         steps = np.arange(0.5, np.linalg.norm((grid.upper - grid.lower).numpy()) / spacing) * spacing
         places = (edge.places[:, None] + steps[:, None] * edge.inward).reshape(-1, 3)
-        others = np.delete(centers, edge.sheet.plane.members.numpy(), axis=0)
         inside = grid.contains(places)
-        met = ~inside | are_near(others, places, BARE * spacing)
+        rest = np.concatenate([np.delete(centers, edge.sheet.plane.members.numpy(), axis=0), others.places])
+        met = ~inside | are_near(rest, places, BARE * spacing)
+        across = are_near(_across(others, edge.outward), places, BARE * spacing)
         behind = torch.from_numpy(places[inside] - BEYOND * spacing * edge.outward)
         # Cameras nearly in line with the face see past the edge in pixels that cover more than that.
         seen_through = np.zeros(len(places), dtype=bool)
         seen_through[inside] = space.holds(behind, 0.0, around=True).numpy()
         seen_through = seen_through.reshape(len(edge.places), len(steps))
         # Rays that graze the edge are taken to pass behind it.
-        return cls(edge, places, met.reshape(seen_through.shape), seen_through & (steps > GRAZED * spacing))
+        met, across = (part.reshape(seen_through.shape) for part in (met, across))
+        return cls(edge, places, met, across, seen_through & (steps > GRAZED * spacing))
 
     def face(self, others: Sequence[Continued], open_ended: bool = False) -> Continued:
         """The places of the face behind the edge, up to what it meets, as `others` that are not along it.
@@ -98,26 +103,27 @@ class _WayBack:
         seen through a door is no inside. Nor is there one past where `others` part it from the edge that was seen.
         """
         outward, met, parted = self.edge.outward, self.met, np.zeros_like(self.met)
-        across = [other.places for other in others if len(other) and abs(float(other.normals[0] @ outward)) < ACROSS]
-        if across:
-            near = are_near(np.concatenate(across), self.places, CUT * self.edge.sheet.raster.spacing)
-            near = near.reshape(met.shape)
-            parted, met = _parted(~(met | self.seen_through), near, self.edge.seen), met | near
+        across = _across(Continued.joined([*others]), outward)
+        if len(across):
+            near = are_near(across, self.places, CUT * self.edge.sheet.raster.spacing).reshape(met.shape)
+            free = self.across | ~(met | self.seen_through)
+            parted, met = _parted(free, near | self.across, self.edge.seen), met | near
         stops, steps = met | self.seen_through, met.shape[1]
         first = np.where(stops.any(axis=1), stops.argmax(axis=1), steps)
         is_met = open_ended | met[np.arange(len(met)), first.clip(max=steps - 1)]
         reached = (np.arange(steps) < first[:, None]) & is_met[:, None] & ~parted
         kept = binary_opening(reached, np.ones((3, 3))).reshape(-1)
-        return Continued(self.places[kept], np.broadcast_to(outward, (int(kept.sum()), 3)).copy())
+        return Continued.facing(self.places[kept], outward)
 
 
 def hidden_faces(
-    sheets: Sequence[Sheet], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float
+    sheets: Sequence[Sheet], centers: np.ndarray, things: Continued, grid: Grid, space: SeenSpace, spacing: float
 ) -> list[Continued]:
     """For each of the sheets the faces behind its edges.
 
     Args:
         sheets: of surfels at `centers` (N, 3), their places along the room.
+        things: that are not flat, all around.
         grid: its box is all that there is.
         space: what cameras looked through.
     """
@@ -130,7 +136,10 @@ def hidden_faces(
         _longest(edge for one in (sheet, *more) for edge in _edges(one))
         for sheet, more in zip(sheets, turned, strict=True)
     ]
-    ways_back = [_WayBack.of(edge, centers, grid, space) for own in edges for edge in own]
+    surfaces = [Continued.facing(sheet.centers, sheet.raster.normal) for sheet in sheets]
+    others = [Continued.joined([*_without(surfaces, i), things]) for i in range(len(sheets))]
+    pairs = zip(edges, others, strict=True)
+    ways_back = [_WayBack.of(edge, centers, other, grid, space) for own, other in pairs for edge in own]
     # First each as if there were no others, then up to these.
     whole = [way.face([]) for way in ways_back]
     faces = [way.face(_without(whole, i)) if len(whole[i]) else whole[i] for i, way in enumerate(ways_back)]
@@ -159,6 +168,11 @@ def _parted(free: np.ndarray, near: np.ndarray, seen: np.ndarray) -> np.ndarray:
     whole, parts = label(free)[0], label(free & ~near)[0]
     start = seen[:, None] & (np.cumsum(~free | near, axis=1) == 0)
     return free & ~near & np.isin(whole, whole[start]) & ~np.isin(parts, parts[start])
+
+
+def _across(surfaces: Continued, outward: np.ndarray) -> np.ndarray:
+    """(K, 3) the places of surfaces that are not along a face with this normal (3,)."""
+    return surfaces.places[np.abs(surfaces.normals @ outward) < ACROSS]
 
 
 def _without(faces: Sequence[Continued], own: int) -> list[Continued]:

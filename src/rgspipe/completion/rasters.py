@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import torch
@@ -39,6 +40,11 @@ class Continued:
 
     def __len__(self) -> int:
         return len(self.places)
+
+    @classmethod
+    def facing(cls, places: np.ndarray, normal: np.ndarray) -> Self:
+        """Of places (G, 3) on a plane with this normal (3,)."""
+        return cls(places, np.broadcast_to(normal, places.shape).copy())
 
     def chosen(self, which: np.ndarray) -> Continued:
         """Some of them."""
@@ -93,8 +99,7 @@ class Raster:
 
     def chosen(self, which: np.ndarray) -> Continued:
         """The places of `which` (A, B), bool."""
-        places = self.places[which.reshape(-1)]
-        return Continued(places, np.broadcast_to(self.normal, places.shape).copy())
+        return Continued.facing(self.places[which.reshape(-1)], self.normal)
 
     def within(self, grid: Grid) -> np.ndarray:
         """(A, B) bool: places with room of the box before them; the plane itself may lie in a side of the box."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -16,18 +17,29 @@ from rgspipe.completion.revolved import Revolved, things_of_revolution
 Finder = Callable[[np.ndarray, np.ndarray, float], "Sequence[Ball | Revolved]"]
 
 
-def gone_around(
-    centers: np.ndarray, normals: np.ndarray, space: SeenSpace, spacing: float
-) -> tuple[Continued, np.ndarray]:
-    """The parts that nobody saw of all round things, and the surfels (M,) of these.
+@dataclass(frozen=True)
+class RoundThings:
+    """All round things among surfels.
 
-    Things that cameras looked through more than they saw of them are none.
+    Attributes:
+        whole: places all around them.
+        added: those of them that nobody saw.
+        members: (M,) int64 indices of their surfels.
+    """
+
+    whole: Continued
+    added: Continued
+    members: np.ndarray
+
+
+def round_things(centers: np.ndarray, normals: np.ndarray, space: SeenSpace, spacing: float) -> RoundThings:
+    """Those that cameras did not look through more than they saw of them.
 
     Args:
         centers, normals: (N, 3) of surfels, along the axes of their room.
         space: what cameras looked through.
     """
-    parts, rest = [], np.arange(len(centers))
+    whole, added, rest = [], [], np.arange(len(centers))
     # A ball has all axes: it comes first, and then what stands.
     kinds: list[tuple[Finder, int]] = [(balls_among, 0), *((things_of_revolution, turn) for turn in (0, 1, 2))]
     for found_among, turn in kinds:
@@ -35,12 +47,14 @@ def gone_around(
         back = np.argsort(order)
         of_kind = rest
         for thing in found_among(centers[of_kind][:, order], normals[of_kind][:, order], spacing):
-            whole = thing.all_around(spacing)
-            whole = Continued(whole.places[:, back], whole.normals[:, back])
-            seen = are_near(centers, whole.places, BARE * spacing)
-            behind = torch.from_numpy(whole.places - BEYOND * spacing * whole.normals)
+            around = thing.all_around(spacing)
+            around = Continued(around.places[:, back], around.normals[:, back])
+            seen = are_near(centers, around.places, BARE * spacing)
+            behind = torch.from_numpy(around.places - BEYOND * spacing * around.normals)
             crossed = space.holds(behind, 0.0, around=True).numpy() & ~seen
             if seen.sum() > crossed.sum():
-                parts.append(whole.chosen(~seen & ~crossed))
+                whole.append(around)
+                added.append(around.chosen(~seen & ~crossed))
                 rest = np.setdiff1d(rest, of_kind[thing.members])
-    return Continued.joined(parts), np.setdiff1d(np.arange(len(centers)), rest)
+    members = np.setdiff1d(np.arange(len(centers)), rest)
+    return RoundThings(Continued.joined(whole), Continued.joined(added), members)

@@ -21,7 +21,14 @@ from rgspipe.completion.rasters import ACROSS, BARE, Continued, Raster, Sheet
 
 
 def continued(
-    planes: Sequence[Plane], centers: np.ndarray, grid: Grid, space: SeenSpace, spacing: float, *, is_room: bool
+    planes: Sequence[Plane],
+    centers: np.ndarray,
+    grid: Grid,
+    space: SeenSpace,
+    spacing: float,
+    *,
+    is_room: bool,
+    things: Continued,
 ) -> Continued:
     """What the planes of surfels become where nothing was seen, and the sides of the grid's box that they lead to.
 
@@ -30,11 +37,12 @@ def continued(
         grid: its box is all that there is.
         space: what cameras looked through.
         is_room: whether there may be walls at the box's sides.
+        things: that are not flat, all around; planes and hidden faces end at them.
     """
     sheets = [Sheet.of(plane, centers, grid, space, spacing) for plane in planes]
-    faces = hidden_faces(sheets, centers, grid, space, spacing)
-    thing = [_whole(sheet) for sheet, own in zip(sheets, faces, strict=True) if len(own)]
-    solids = Solids(Continued.joined([*faces, *thing]))
+    faces = hidden_faces(sheets, centers, things, grid, space, spacing)
+    flat = [_whole(sheet) for sheet, own in zip(sheets, faces, strict=True) if len(own)]
+    solids = Solids(Continued.joined([*faces, *flat, things]))
     inner = Continued.joined([*(_beyond(sheet, solids) for sheet in sheets), *faces])
     if not is_room:
         return inner
@@ -46,7 +54,7 @@ def continued(
 
 @dataclass(frozen=True)
 class Solids:
-    """What bounds things: faces that nobody saw, and the surfaces behind whose edges these are."""
+    """What bounds things: faces that nobody saw, the surfaces behind whose edges these are, and all that is round."""
 
     bounds: Continued
 

@@ -24,7 +24,7 @@ from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
 from rgspipe.completion.planes import Plane, frame_of, planes_of
 from rgspipe.completion.rasters import BARE, Continued
-from rgspipe.completion.round_things import gone_around
+from rgspipe.completion.round_things import round_things
 from rgspipe.completion.structure import continued
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.renderer.openness import openness
@@ -155,9 +155,10 @@ def _shapes(
 ) -> Continued:
     """What flat surfaces and round things become where nothing was seen."""
     centers, normals = (part.double().cpu().numpy() for part in (surfels.centers, surfels.normals))
-    around, bent = gone_around(centers, normals, space, spacing)
-    flat = [plane for plane in planes if np.isin(plane.members.numpy(), bent).mean() < 0.5]
-    return Continued.joined([continued(flat, centers, grid, space, spacing, is_room=is_room), around])
+    bent = round_things(centers, normals, space, spacing)
+    flat = [plane for plane in planes if np.isin(plane.members.numpy(), bent.members).mean() < 0.5]
+    planes_on = continued(flat, centers, grid, space, spacing, is_room=is_room, things=bent.whole)
+    return Continued.joined([planes_on, bent.added])
 
 
 def _ended(surfels: Surfels, seen: int, spacing: float) -> Surfels:

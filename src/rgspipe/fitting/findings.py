@@ -153,6 +153,16 @@ class OnSurface(Finding):
 
 
 @dataclass(frozen=True)
+class BehindSurfaces(Finding):
+    """Surfaces get next to none of the light of light `number` of `count`: `share` of what one as far away may send."""
+
+    number: int
+    count: int
+    share: float
+    status = FitStatus.UNDETERMINED
+
+
+@dataclass(frozen=True)
 class PoorScene(Finding):
     """The scene itself was graded poor: its lights are expected to be off by `error`, a part of its size."""
 

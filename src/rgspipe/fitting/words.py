@@ -9,6 +9,7 @@ from rgspipe.fitting.alternative import Alternative
 from rgspipe.fitting.findings import (
     AllStepsTaken,
     AmbientOpen,
+    BehindSurfaces,
     ExposureUnknown,
     ExtentOpen,
     Finding,
@@ -164,6 +165,12 @@ def _on_surface(found: OnSurface) -> str:
     return f"{which} stands on a surface, where lights that belong elsewhere are stopped: give more views."
 
 
+def _behind(found: BehindSurfaces) -> str:
+    which = _the_light(found.number, found.count)
+    where = f"{which} stands behind surfaces or inside of a thing, where lights that belong elsewhere may end"
+    return f"{where}: {percent(found.share, 1)} of what one in the open would send reaches the scene; give more views."
+
+
 def _poor_scene(found: PoorScene) -> str:
     return f"The scene is poor: lights in it are expected to be off by {percent(found.error, 0)} of its size."
 
@@ -242,6 +249,7 @@ _WORDS: dict[type[Finding], Callable[..., str]] = {
     RoughShape: _rough,
     Uncertain: _uncertain,
     OnSurface: _on_surface,
+    BehindSurfaces: _behind,
     PoorScene: _poor_scene,
     AllStepsTaken: _all_steps,
     MaybeOneMore: _maybe,

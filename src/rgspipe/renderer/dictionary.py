@@ -13,6 +13,7 @@ from rgspipe.errors import InputError
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.direct import unit_irradiance
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
+from rgspipe.renderer.reach import LEAST_FLUX, Reach
 from rgspipe.renderer.surroundings import Surroundings
 from rgspipe.scene.surfels import Surfels
 
@@ -28,10 +29,6 @@ INSET = 0.4
 
 #: A light nearer to a surfel than this many of its scales is inside the surface as the scene knows it.
 CLEARANCE_SCALES = 2.0
-
-#: A candidate that sends less than this share of the best candidate's flux to the scene's front sides is inside
-#: a solid, or behind a wall.
-LEAST_FLUX = 0.02
 
 #: Candidates whose shadows are computed at once; bounds the memory of the derivative that comes with them.
 BATCH = 8
@@ -58,6 +55,10 @@ class LightDictionary:
     def to(self, device: torch.device | str) -> LightDictionary:
         """The same with the irradiance on another device."""
         return replace(self, irradiance=self.irradiance.to(device))
+
+    def reach(self, areas: Tensor, surroundings: Surroundings) -> Reach:
+        """How much of a light in the best places reaches the scene, of N surfels of `areas` (N,)."""
+        return Reach.of(surroundings, self.positions, self.irradiance @ areas.to(self.irradiance))
 
     def joined(self, bvh: SurfelBvh, positions: Tensor, shadows: bool = True) -> LightDictionary:
         """The same with further unit lights at `positions` (K, 3), among N surfels."""
@@ -87,7 +88,7 @@ def build_dictionary(
 ) -> LightDictionary:
     """Candidates on a grid of the scene's bounding box, without those inside or too near to its surfaces.
 
-    An open scene has candidates around it as well, which are kept if they light anything.
+    An open scene has candidates around it as well. All light it; see `reach`.
 
     Args:
         bvh: N surfels.
@@ -104,16 +105,13 @@ def build_dictionary(
     _check_place(surroundings)
     positions = candidate_grid(surroundings.lower, surroundings.upper, grid, seed)
     positions = positions[_clear_of_surfels(bvh.surfels, positions)]
-    within = len(positions)
     if surroundings.open:
         positions = torch.cat([positions, surroundings.shell_points()])
     irradiance = _irradiance(bvh, positions, shadows, shown=True)
     _check_unit(irradiance, surroundings)
     flux = irradiance @ areas.to(irradiance)
-    kept = flux > 0.0
-    if within > 0:
-        kept[:within] = flux[:within] > LEAST_FLUX * flux[:within].amax()
-    return LightDictionary(positions[kept.cpu()], irradiance[kept], grid, seed)
+    kept = Reach.of(surroundings, positions, flux).shares(positions, flux) > LEAST_FLUX
+    return LightDictionary(positions[kept], irradiance[kept.to(irradiance.device)], grid, seed)
 
 
 def _check_place(surroundings: Surroundings) -> None:
