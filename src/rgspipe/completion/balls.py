@@ -38,7 +38,7 @@ MEDIAN, MEDIAN_OF_TWO = 0.455, 1.386
 
 
 @dataclass(frozen=True)
-class Ball:
+class SeenBall:
     """A ball that some surfels lie on.
 
     Attributes:
@@ -57,7 +57,7 @@ class Ball:
         return Continued(self.middle + self.radius * normals, normals)
 
 
-def balls_among(centers: np.ndarray, normals: np.ndarray, spacing: float) -> list[Ball]:
+def balls_among(centers: np.ndarray, normals: np.ndarray, spacing: float) -> list[SeenBall]:
     """Those among surfels at `centers` (N, 3), the one with most first; no surfel is of two."""
     rest, found = np.arange(len(centers)), []
     while len(rest) >= FEWEST:
@@ -69,7 +69,7 @@ def balls_among(centers: np.ndarray, normals: np.ndarray, spacing: float) -> lis
     return found
 
 
-def ball_of(centers: np.ndarray, normals: np.ndarray, members: np.ndarray, spacing: float) -> Ball | None:
+def ball_of(centers: np.ndarray, normals: np.ndarray, members: np.ndarray, spacing: float) -> SeenBall | None:
     """The ball that surfels `members` (M,) lie on, most of them; None if they lie on none, or do not tell which.
 
     Its members are those of them that do.
@@ -89,10 +89,10 @@ def ball_of(centers: np.ndarray, normals: np.ndarray, members: np.ndarray, spaci
     doubt = np.sqrt(((ways @ covariance) * ways).sum(axis=1).max())
     if doubt > DOUBT * spacing or _spread(normals[kept]) < SPREAD:
         return None
-    return Ball(middle, radius, kept)
+    return SeenBall(middle, radius, kept)
 
 
-def _best(centers: np.ndarray, normals: np.ndarray, rest: np.ndarray, spacing: float) -> Ball | None:
+def _best(centers: np.ndarray, normals: np.ndarray, rest: np.ndarray, spacing: float) -> SeenBall | None:
     """The ball with most surfels among `rest`; None where there is none."""
     places, ways = centers[rest], normals[rest]
     middles, radii = _local(places, ways)
@@ -108,7 +108,7 @@ def _best(centers: np.ndarray, normals: np.ndarray, rest: np.ndarray, spacing: f
         if ball is not None:
             # Rough ones have surfels before and behind them, which are no further ball.
             whole = _lie_on(places, ways, ball.middle, ball.radius, 2.0 * OFF * spacing)
-            return Ball(ball.middle, ball.radius, rest[whole])
+            return SeenBall(ball.middle, ball.radius, rest[whole])
     return None
 
 

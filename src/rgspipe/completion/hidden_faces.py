@@ -67,7 +67,7 @@ class _WayBack:
         edge: of E places, from each of which it goes D steps.
         places: (E · D, 3).
         met: (E, D) bool, surfaces, or the end of the box.
-        across: (E, D) bool, surfaces that stand across a face there.
+        across: (E, D) bool, surfaces that stand across a face there, or the end of the box.
         seen_through: (E, D) bool, a camera saw something behind.
     """
 
@@ -86,7 +86,7 @@ class _WayBack:
         inside = grid.contains(places)
         rest = np.concatenate([np.delete(centers, edge.sheet.plane.members.numpy(), axis=0), others.places])
         met = ~inside | are_near(rest, places, BARE * spacing)
-        across = are_near(_across(others, edge.outward), places, BARE * spacing)
+        across = ~inside | are_near(_across(others, edge.outward), places, BARE * spacing)
         behind = torch.from_numpy(places[inside] - BEYOND * spacing * edge.outward)
         # Cameras nearly in line with the face see past the edge in pixels that cover more than that.
         seen_through = np.zeros(len(places), dtype=bool)
@@ -100,14 +100,13 @@ class _WayBack:
         """The places of the face behind the edge, up to what it meets, as `others` that are not along it.
 
         Where a camera looked through it before it met anything there is none, unless it may be `open_ended`: what was
-        seen through a door is no inside. Nor is there one past where `others` part it from the edge that was seen.
+        seen through a door is no inside. Nor is there one past what stands across and parts it from the edge as seen.
         """
         outward, met, parted = self.edge.outward, self.met, np.zeros_like(self.met)
-        across = _across(Continued.joined([*others]), outward)
-        if len(across):
+        if others:
+            across = _across(Continued.joined([*others]), outward)
             near = are_near(across, self.places, CUT * self.edge.sheet.raster.spacing).reshape(met.shape)
-            free = self.across | ~(met | self.seen_through)
-            parted, met = _parted(free, near | self.across, self.edge.seen), met | near
+            parted, met = _parted(near | self.across, self.edge.seen), met | near
         stops, steps = met | self.seen_through, met.shape[1]
         first = np.where(stops.any(axis=1), stops.argmax(axis=1), steps)
         is_met = open_ended | met[np.arange(len(met)), first.clip(max=steps - 1)]
@@ -156,18 +155,17 @@ def hidden_faces(
     return [Continued.joined([next(rest) for _ in own]) for own in edges]
 
 
-def _parted(free: np.ndarray, near: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """(E, D) bool: the places that hang together with those behind the `seen` (E,) part of an edge only across `near`.
+def _parted(across: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(E, D) bool: the places that hang together with those behind the `seen` (E,) part of an edge only through others.
 
-    Edges go on where nothing is known of them, past the faces of their own thing.
+    Edges go on where nothing is known of them, past the faces of their own thing and into other things.
 
     Args:
-        free: (E, D) bool, places where nothing but other faces stops a face.
-        near: (E, D) bool, those beside other faces.
+        across: (E, D) bool, what stands across a face there.
     """
-    whole, parts = label(free)[0], label(free & ~near)[0]
-    start = seen[:, None] & (np.cumsum(~free | near, axis=1) == 0)
-    return free & ~near & np.isin(whole, whole[start]) & ~np.isin(parts, parts[start])
+    parts = label(~across)[0]
+    start = seen[:, None] & (np.cumsum(across, axis=1) == 0)
+    return ~across & ~np.isin(parts, parts[start])
 
 
 def _across(surfaces: Continued, outward: np.ndarray) -> np.ndarray:

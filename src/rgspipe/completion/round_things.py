@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from rgspipe.completion.balls import Ball, balls_among
+from rgspipe.completion.balls import SeenBall, balls_among
 from rgspipe.completion.free_space import SeenSpace
 from rgspipe.completion.rasters import BARE, BEYOND, Continued, are_near
 from rgspipe.completion.revolved import Revolved, things_of_revolution
 
 #: Finds things among surfels at (N, 3) with normals (N, 3), a distance apart.
-Finder = Callable[[np.ndarray, np.ndarray, float], "Sequence[Ball | Revolved]"]
+Finder = Callable[[np.ndarray, np.ndarray, float], "Sequence[SeenBall | Revolved]"]
 
 
 @dataclass(frozen=True)
