@@ -71,6 +71,8 @@ def test_what_is_no_ball_or_does_not_tell_one_is_left() -> None:
     assert not balls_among(box.centers.double().numpy(), box.normals.double().numpy(), SPACING)
     assert not balls_among(*cap(0.4 * SPREAD, 1e-4, 0.01, 0), SPACING)
     assert not balls_among(*cap(0.7, SPACING, 0.4 * ASKEW, 0), SPACING)
+    flat = np.random.default_rng(0).uniform(size=(200, 3)) * [1.0, 1.0, 0.0]
+    assert ball_of(flat, np.tile([0.0, 0.0, 1.0], (200, 1)), np.arange(200), SPACING) is None
     few = [part[: FEWEST - 1] for part in cap(1.2, 1e-4, 0.01, 0)]
     assert not balls_among(*few, SPACING) and ball_of(*few, np.arange(FEWEST - 1), SPACING) is None
 

@@ -7,7 +7,7 @@ variance.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -70,37 +70,32 @@ def balls_among(centers: np.ndarray, normals: np.ndarray, spacing: float) -> lis
 
 
 def ball_of(centers: np.ndarray, normals: np.ndarray, members: np.ndarray, spacing: float) -> SeenBall | None:
-    """The ball that surfels `members` (M,) lie on, most of them; None if they lie on none, or do not tell which.
+    """The ball that most of the surfels `members` (M,) lie on; None if they lie on none, or do not tell which.
 
     Its members are those of them that do.
     """
     kept = members
     for _ in range(ROUNDS):
-        if len(kept) < FEWEST:
+        # Surfels that face nearly alike leave open which ball it is, to rounding.
+        if len(kept) < max(FEWEST, 0.5 * len(members)) or _spread(normals[kept]) < SPREAD:
             return None
         middle, radius, covariance = _fitted(centers[kept], normals[kept])
         on = _lie_on(centers[members], normals[members], middle, radius, OFF * spacing)
         kept, before = members[on], kept
         if np.array_equal(kept, before):
-            break
-    if 2 * len(kept) < len(members) or len(kept) < FEWEST:
-        return None
-    ways = np.column_stack([_evenly(64), np.ones(64)])
-    doubt = np.sqrt(((ways @ covariance) * ways).sum(axis=1).max())
-    if doubt > DOUBT * spacing or _spread(normals[kept]) < SPREAD:
-        return None
-    return SeenBall(middle, radius, kept)
+            ways = np.column_stack([_evenly(64), np.ones(64)])
+            variance = ((ways @ covariance) * ways).sum(axis=1).max()
+            return SeenBall(middle, radius, kept) if variance < (DOUBT * spacing) ** 2 else None
+    return None
 
 
 def _best(centers: np.ndarray, normals: np.ndarray, rest: np.ndarray, spacing: float) -> SeenBall | None:
     """The ball with most surfels among `rest`; None where there is none."""
     places, ways = centers[rest], normals[rest]
     middles, radii = _local(places, ways)
-    ranked = []
-    for index in np.linspace(0, len(radii) - 1, min(TRIED, len(radii))).round().astype(int):
-        on = np.flatnonzero(_lie_on(places, ways, middles[index], radii[index], 2.0 * OFF * spacing))
-        ranked.append(on)
-    for on in sorted(ranked, key=len, reverse=True):
+    tried = np.linspace(0, len(radii) - 1, min(TRIED, len(radii))).round().astype(int)
+    found = [_lie_on(places, ways, middles[index], radii[index], 2.0 * OFF * spacing) for index in tried]
+    for on in sorted(map(np.flatnonzero, found), key=len, reverse=True):
         if len(on) < FEWEST:
             return None
         # From the surfels around one the ball is known roughly: those near it tell it well.
@@ -108,7 +103,7 @@ def _best(centers: np.ndarray, normals: np.ndarray, rest: np.ndarray, spacing: f
         if ball is not None:
             # Rough ones have surfels before and behind them, which are no further ball.
             whole = _lie_on(places, ways, ball.middle, ball.radius, 2.0 * OFF * spacing)
-            return SeenBall(ball.middle, ball.radius, rest[whole])
+            return replace(ball, members=rest[whole])
     return None
 
 

@@ -78,32 +78,36 @@ class _WayBack:
     seen_through: np.ndarray
 
     @classmethod
-    def of(cls, edge: _Edge, centers: np.ndarray, others: Continued, grid: Grid, space: SeenSpace) -> _WayBack:
-        """Among surfels at `centers` (N, 3), and `others` that are on other sheets or round."""
+    def of(cls, edge: _Edge, known: np.ndarray, others: Continued, grid: Grid, space: SeenSpace) -> _WayBack:
+        """Among places (K, 3) that have surfaces, first those of all surfels; on `others` is known where they face."""
         spacing = edge.sheet.raster.spacing
         steps = np.arange(0.5, np.linalg.norm((grid.upper - grid.lower).numpy()) / spacing) * spacing
-        places = (edge.places[:, None] + steps[:, None] * edge.inward).reshape(-1, 3)
-        inside = grid.contains(places)
-        rest = np.concatenate([np.delete(centers, edge.sheet.plane.members.numpy(), axis=0), others.places])
-        met = ~inside | are_near(rest, places, BARE * spacing)
-        across = ~inside | are_near(_across(others, edge.outward), places, BARE * spacing)
-        behind = torch.from_numpy(places[inside] - BEYOND * spacing * edge.outward)
+        places = edge.places[:, None] + steps[:, None] * edge.inward
+        inside = grid.contains(places.reshape(-1, 3)).reshape(places.shape[:2])
+        # One step past the end of the box, which all ways meet.
+        count = np.flatnonzero(inside.any(axis=0)).max(initial=0) + 2
+        steps, places, outside = steps[:count], places[:, :count].reshape(-1, 3), ~inside[:, :count]
+
+        def near(points: np.ndarray) -> np.ndarray:
+            return are_near(points, places, BARE * spacing).reshape(outside.shape)
+
+        met = outside | near(np.delete(known, edge.sheet.plane.members.numpy(), axis=0))
+        across = outside | near(_across(others, edge.outward))
+        behind = torch.from_numpy(places - BEYOND * spacing * edge.outward)
         # Cameras nearly in line with the face see past the edge in pixels that cover more than that.
-        seen_through = np.zeros(len(places), dtype=bool)
-        seen_through[inside] = space.holds(behind, 0.0, around=True).numpy()
-        seen_through = seen_through.reshape(len(edge.places), len(steps))
+        seen_through = space.holds(behind, 0.0, around=True).numpy().reshape(outside.shape)
         # Rays that graze the edge are taken to pass behind it.
-        met, across = (part.reshape(seen_through.shape) for part in (met, across))
         return cls(edge, places, met, across, seen_through & (steps > GRAZED * spacing))
 
-    def face(self, others: Sequence[Continued], open_ended: bool = False) -> Continued:
+    def face(self, others: Sequence[Continued] | None = None, open_ended: bool = False) -> Continued:
         """The places of the face behind the edge, up to what it meets, as `others` that are not along it.
 
+        Without `others` it is as large as it may be: nothing parts it either.
         Where a camera looked through it before it met anything there is none, unless it may be `open_ended`: what was
         seen through a door is no inside. Nor is there one past what stands across and parts it from the edge as seen.
         """
         outward, met, parted = self.edge.outward, self.met, np.zeros_like(self.met)
-        if others:
+        if others is not None:
             across = _across(Continued.joined([*others]), outward)
             near = are_near(across, self.places, CUT * self.edge.sheet.raster.spacing).reshape(met.shape)
             parted, met = _parted(near | self.across, self.edge.seen), met | near
@@ -137,14 +141,14 @@ def hidden_faces(
     ]
     surfaces = [Continued.facing(sheet.centers, sheet.raster.normal) for sheet in sheets]
     others = [Continued.joined([*_without(surfaces, i), things]) for i in range(len(sheets))]
-    pairs = zip(edges, others, strict=True)
-    ways_back = [_WayBack.of(edge, centers, other, grid, space) for own, other in pairs for edge in own]
+    known, pairs = np.concatenate([centers, things.places]), zip(edges, others, strict=True)
+    ways_back = [_WayBack.of(edge, known, other, grid, space) for own, other in pairs for edge in own]
     # First each as if there were no others, then up to these.
-    whole = [way.face([]) for way in ways_back]
+    whole = [way.face() for way in ways_back]
     faces = [way.face(_without(whole, i)) if len(whole[i]) else whole[i] for i, way in enumerate(ways_back)]
     # Where cameras look past a thing two of its faces end each other, of which either would be seen through.
     dropped = [i for i, one in enumerate(whole) if not len(one)]
-    ending = [one if len(one) else way.face([], open_ended=True) for way, one in zip(ways_back, whole, strict=True)]
+    ending = [one if len(one) else way.face(open_ended=True) for way, one in zip(ways_back, whole, strict=True)]
     for _ in range(2):
         for i in dropped:
             faces[i] = ways_back[i].face(_without(ending, i))

@@ -12,6 +12,7 @@ from dataclasses import replace
 import torch
 
 from rgspipe.fitting.alternative import Alternative
+from rgspipe.fitting.certainty.behind_surfaces import behind_surfaces
 from rgspipe.fitting.certainty.minima import holding
 from rgspipe.fitting.certainty.uncertainty import light_covariances
 from rgspipe.fitting.course import BRIGHT_SPOTS, POLISH, weight
@@ -55,6 +56,9 @@ def polished(
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(refiner.problem, meter)
     findings = _findings(found, refiner, best, options, spec)
+    # Whoever begins elsewhere than at the scene's candidates need not have any: they take seconds.
+    frozen, shadows = refiner.problem.views.frozen, refiner.problem.model.effects.shadows
+    findings = (*findings, *behind_surfaces(best.lights(refiner.problem), frozen, shadows))
     costs = Costs.of(found.refiner, found.compared)
     return _result(refiner, best, findings, costs, options, others, found.weighed)
 

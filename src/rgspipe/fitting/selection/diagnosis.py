@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from torch import Tensor
 
-from rgspipe.fitting.certainty.behind_surfaces import behind_surfaces
 from rgspipe.fitting.certainty.doubts import doubts
 from rgspipe.fitting.findings import (
     AtBound,
@@ -45,7 +44,6 @@ def standing(
         *([PoorlyExplained(loss)] if loss > options.poorly else []),
         *([PoorScene(grade.error)] if grade is not None and grade.grade is Grade.POOR else []),
         *doubts(state.lights(problem), covariance, problem.views.frozen.bvh.surfels, region.size, options),
-        *behind_surfaces(state.lights(problem), problem.views.frozen, problem.model.effects.shadows),
         *([ScaleOpen(grade.scale)] if grade is not None and grade.scale > TIED else []),
         *([OutOfSteps()] if state.status is FitStatus.MAX_ITERATIONS else []),
     ]
