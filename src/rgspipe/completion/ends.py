@@ -1,9 +1,12 @@
-"""Where faces that were guessed end: at the other faces of their thing.
+"""Where faces end: at the other faces of their thing.
 
-Surfels overlap, so one beside an edge hangs over it, by more than a distance of surfels where its face was laid down to
-the edge. Those that cameras saw are cut there (`training.initialise.edges`); without that a lamp behind a thing has a
-shadow that is too wide, and is taken to stand farther from it. Two faces that a thing turns outwards lie behind each
-other's planes, so each is cut at the plane of the other.
+Surfels overlap, so one beside an edge hangs over it, by more than a distance of surfels where a guessed face was laid
+down to the edge; a lamp behind a thing then has a shadow that is too wide, and is taken to stand farther from it. Two
+faces that a thing turns outwards lie behind each other's planes, so each is cut at the plane of the other.
+
+Surfels that cameras saw are cut by depth and photographs already (`training.initialise.edges`, `training.refine`), each
+for itself: of those along an edge the ones that reach farthest cast its shadow, a fifteenth of a distance too wide.
+Planes are known far better, so where two meet they say where the edge is.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rgspipe.completion.rasters import ACROSS
+from rgspipe.completion.rims import TURN, Rims
 from rgspipe.scene.surfels import NO_CLIP
 
 #: Surfels of other faces are looked for so far from a surfel, and those of the two faces to tell how these lie to each
@@ -29,14 +33,17 @@ GOES_ON = 2.0
 #: Edges a surfel can have.
 MOST = 2
 
+#: Surfels that are looked at together.
+AT_ONCE = 4096
+
 
 @dataclass(frozen=True)
 class Ends:
-    """How U surfels end.
+    """How N surfels end.
 
     Attributes:
-        kept: (U,) bool: not those whose middle is past an end.
-        offsets, angles: (U, 2) as of `Surfels`; NO_CLIP and 0 where there is no end.
+        kept: (N,) bool: not guessed ones whose middle is past an end.
+        offsets, angles: (N, 2) as of `Surfels`; NO_CLIP and 0 where there is no end.
     """
 
     kept: np.ndarray
@@ -44,29 +51,56 @@ class Ends:
     angles: np.ndarray
 
 
-def ends(centers: np.ndarray, normals: np.ndarray, axes: np.ndarray, chosen: np.ndarray, spacing: float) -> Ends:
-    """Of the surfels `chosen` (U,), indices, of those at `centers` (N, 3) with unit `normals` (N, 3).
+#: An end: how far it is from a surfel's centre, in distances of neighbours, and its (3,) outward direction.
+End = tuple[float, np.ndarray]
+
+
+def ends(centers: np.ndarray, normals: np.ndarray, axes: np.ndarray, rims: Rims, seen: int, spacing: float) -> Ends:
+    """Of surfels at `centers` (N, 3) with unit `normals` (N, 3), of which cameras saw the first `seen`.
 
     Args:
-        axes: (U, 2, 3) in-plane axes u and v of the chosen ones.
+        axes: (N, 2, 3) in-plane axes u and v.
+        rims: where they end as far as is known.
         spacing: distance of neighbours.
     """
-    found = Ends(np.ones(len(chosen), dtype=bool), np.full((len(chosen), MOST), NO_CLIP), np.zeros((len(chosen), MOST)))
-    if not len(chosen):
-        return found
-    lists = cKDTree(centers).query_ball_point(centers[chosen], AROUND * spacing, return_sorted=True)
-    for row, (own, near) in enumerate(zip(chosen, lists, strict=True)):
-        around = np.asarray(near)
-        away, facing = (centers[around] - centers[own]) / spacing, normals[around]
-        edges = _edges(away, facing, normals[own])
-        for place, (offset, outward) in enumerate(sorted(edges, key=lambda edge: edge[0])[:MOST]):
-            found.kept[row] &= offset > 0.0
-            found.offsets[row, place] = spacing * offset
-            found.angles[row, place] = np.arctan2(outward @ axes[row, 1], outward @ axes[row, 0])
+    count = len(centers)
+    found = Ends(np.ones(count, dtype=bool), np.full((count, MOST), NO_CLIP), np.zeros((count, MOST)))
+    tree = cKDTree(centers)
+    for first in range(0, count, AT_ONCE):
+        chosen = np.arange(first, min(first + AT_ONCE, count))
+        lists = tree.query_ball_point(centers[chosen], AROUND * spacing, return_sorted=True)
+        for own, near in zip(chosen, lists, strict=True):
+            around = np.asarray(near)
+            own_ends = [
+                (float((place - centers[own]) @ outward) / spacing, outward)
+                for place, outward, known in zip(rims.places[own], rims.outward[own], rims.known[own], strict=True)
+                if known
+            ]
+            edges = _edges((centers[around] - centers[own]) / spacing, normals[around], normals[own])
+            if own < seen:
+                edges = _agreed(edges, own_ends)
+            rest = [end for end in own_ends if not any(_is_along(end, edge) for edge in edges)]
+            for place, (offset, outward) in enumerate(sorted([*edges, *rest], key=lambda end: end[0])[:MOST]):
+                found.kept[own] &= own < seen or offset > 0.0
+                found.offsets[own, place] = spacing * offset
+                found.angles[own, place] = np.arctan2(outward @ axes[own, 1], outward @ axes[own, 0])
     return found
 
 
-def _edges(away: np.ndarray, facing: np.ndarray, normal: np.ndarray) -> list[tuple[float, np.ndarray]]:
+def _agreed(edges: list[End], own: list[End]) -> list[End]:
+    """Those edges that a surfel which was seen may have: it is not past one, and ends nowhere else that way."""
+    return [
+        edge
+        for edge in edges
+        if edge[0] > 0.0 and all(abs(edge[0] - end[0]) < ON_PLANE for end in own if _is_along(end, edge))
+    ]
+
+
+def _is_along(end: End, other: End) -> bool:
+    return float(end[1] @ other[1]) > np.cos(TURN)
+
+
+def _edges(away: np.ndarray, facing: np.ndarray, normal: np.ndarray) -> list[End]:
     """How far the edges of a face are from a surfel of it, in its plane, and their (3,) outward directions.
 
     Args:

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from rgspipe.completion.depth_views import DepthViews
 from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Camera
@@ -76,10 +77,12 @@ class SeenSpace:
     Attributes:
         cameras: of images with LONGEST_SIDE pixels along a side at most.
         reaches: for each of them (H · W,) float64, the distance at which the ray of each pixel ends.
+        depth_views: the photographs whose depth is known, as they are.
     """
 
     cameras: tuple[Camera, ...]
     reaches: tuple[Tensor, ...]
+    depth_views: DepthViews
 
     @classmethod
     def of(cls, bvh: SurfelBvh, cameras: Sequence[Camera], depths: Sequence[Tensor | None] = ()) -> SeenSpace:
@@ -91,7 +94,8 @@ class SeenSpace:
         """
         reduced = tuple(camera.reduced(LONGEST_SIDE) for camera in cameras)
         known = depths or [None] * len(reduced)
-        return cls(reduced, tuple(_reach(bvh, *one) for one in zip(reduced, known, strict=True)))
+        reaches = tuple(_reach(bvh, *one) for one in zip(reduced, known, strict=True))
+        return cls(reduced, reaches, DepthViews.of(cameras, depths))
 
     def holds(self, points: Tensor, margin: float, *, around: bool = False) -> Tensor:
         """(P,) bool: points (P, 3) that lie nearer to a camera, by `margin`, than the surface behind them.

@@ -15,6 +15,7 @@ import torch
 from scipy.ndimage import binary_closing, binary_opening, label
 from scipy.spatial import cKDTree
 
+from rgspipe.completion.depth_views import Strip
 from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.rasters import ACROSS, BARE, BEYOND, Continued, Sheet, are_near
 
@@ -26,6 +27,9 @@ PAST, AROUND = 0.5, 2.0
 
 #: So many distances of surfels behind an edge a face is not seen through: pixels are as wide as surfels.
 GRAZED = 2.0
+
+#: Rays that end within so many distances of surfels of a sheet's plane end on it.
+ON_SURFACE = 0.25
 
 #: Other faces end a face so many distances of surfels before they cross it.
 CUT = 0.75
@@ -136,7 +140,7 @@ def hidden_faces(
         for sheet, other in zip(sheets, ways, strict=True)
     ]
     edges = [
-        _longest(edge for one in (sheet, *more) for edge in _edges(one))
+        _longest(edge for one in (sheet, *more) for edge in _edges(one, space))
         for sheet, more in zip(sheets, turned, strict=True)
     ]
     surfaces = [Continued.facing(sheet.centers, sheet.raster.normal) for sheet in sheets]
@@ -222,14 +226,14 @@ def _longest(edges: Iterable[_Edge]) -> list[_Edge]:
     return kept
 
 
-def _edges(sheet: Sheet) -> Iterator[_Edge]:
+def _edges(sheet: Sheet, space: SeenSpace) -> Iterator[_Edge]:
     """All straight ones along the axes of its raster."""
     for axis in (0, 1):
         for sign in (1, -1):
-            yield from _edges_towards(sheet, axis, sign)
+            yield from _edges_towards(sheet, space, axis, sign)
 
 
-def _edges_towards(sheet: Sheet, axis: int, sign: int) -> Iterator[_Edge]:
+def _edges_towards(sheet: Sheet, space: SeenSpace, axis: int, sign: int) -> Iterator[_Edge]:
     """Those past which places are crossed along an axis of the raster, with or against it."""
 
     def turned(values: np.ndarray) -> np.ndarray:
@@ -246,7 +250,7 @@ def _edges_towards(sheet: Sheet, axis: int, sign: int) -> Iterator[_Edge]:
         labels, count = label(binary_closing(ends[:, column : column + 2].any(axis=1), np.ones(3)))
         ends[:, column : column + 2] = False
         for run in (np.flatnonzero(labels == index) for index in range(1, count + 1)):
-            past = _past(sheet, places[run, column], along, outward) if len(run) >= SHORTEST else None
+            past = _past(sheet, places[run, column], along, outward, space) if len(run) >= SHORTEST else None
             if past is not None:
                 rows = _reach(run, goes_on[:, column])
                 seen = np.isin(rows, run)
@@ -258,12 +262,22 @@ def _next(values: np.ndarray, steps: int) -> np.ndarray:
     return np.pad(values, ((0, 0), (0, steps)))[:, steps:]
 
 
-def _past(sheet: Sheet, places: np.ndarray, along: np.ndarray, outward: np.ndarray) -> float | None:
-    """How far past places (E, 3) near an edge this is, as surfels beside it tell; None where there are none."""
+def _past(sheet: Sheet, places: np.ndarray, along: np.ndarray, outward: np.ndarray, space: SeenSpace) -> float | None:
+    """How far past places (E, 3) near an edge this is; None where no surfel is beside it.
+
+    As photographs with depth show it, or else as the last of the surfels tell.
+    """
     spacing, offset = sheet.raster.spacing, sheet.centers @ outward - float(places[0] @ outward)
     row, rows = sheet.centers @ along, places @ along
-    beside = (np.abs(offset) < AROUND * spacing) & (row > rows.min() - spacing) & (row < rows.max() + spacing)
-    return float(np.quantile(offset[beside], LAST)) + PAST * spacing if beside.any() else None
+    low, high = rows.min() - spacing, rows.max() + spacing
+    beside = (np.abs(offset) < AROUND * spacing) & (row > low) & (row < high)
+    if not beside.any():
+        return None
+    last = float(np.quantile(offset[beside], LAST)) + PAST * spacing
+    first = float(places[0] @ along)
+    strip = Strip(places[0], along, outward, sheet.raster.normal, (low - first, high - first), AROUND * spacing)
+    shown = space.depth_views.edge_in(strip, ON_SURFACE * spacing)
+    return last if shown is None else shown
 
 
 def _reach(run: np.ndarray, goes_on: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
 from rgspipe.completion.planes import Plane, frame_of, planes_of
 from rgspipe.completion.rasters import BARE, Continued
+from rgspipe.completion.rims import Rims
 from rgspipe.completion.round_things import round_things
 from rgspipe.completion.structure import continued
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -162,15 +163,13 @@ def _shapes(
 
 
 def _ended(surfels: Surfels, seen: int, spacing: float) -> Surfels:
-    """The surfels, of which those after the first `seen` end where their faces meet others."""
-    chosen = np.arange(seen, len(surfels))
+    """The surfels, of which cameras saw the first `seen`, ending where their faces meet others."""
     centers, normals = (part.double().cpu().numpy() for part in (surfels.centers, surfels.normals))
-    axes = quaternion_to_axes(surfels.rotations[seen:].double()).cpu().numpy()
-    found = ends(centers, normals, axes[:, :2], chosen, spacing)
-    offsets, angles = surfels.clip_offsets.clone(), surfels.clip_angles.clone()
-    offsets[seen:], angles[seen:] = (torch.from_numpy(part).to(offsets) for part in (found.offsets, found.angles))
-    kept = np.concatenate([np.arange(seen), chosen[found.kept]])
-    return replace(surfels, clip_offsets=offsets, clip_angles=angles).selected(torch.from_numpy(kept))
+    axes = quaternion_to_axes(surfels.rotations.double()).cpu().numpy()[:, :2]
+    found = ends(centers, normals, axes, Rims.of(surfels), seen, spacing)
+    offsets, angles = torch.from_numpy(found.offsets), torch.from_numpy(found.angles)
+    cut = replace(surfels, clip_offsets=offsets.to(surfels.clip_offsets), clip_angles=angles.to(surfels.clip_angles))
+    return cut.selected(torch.from_numpy(np.flatnonzero(found.kept)))
 
 
 def _turned(surfels: Surfels, frame: Tensor) -> Surfels:

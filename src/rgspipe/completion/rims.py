@@ -1,0 +1,45 @@
+"""Where surfels that were seen end: the straight edges that depth and photographs gave them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_to_axes
+
+#: Rims that face within this angle [rad] of each other may be of one edge.
+TURN = np.radians(20.0)
+
+
+@dataclass(frozen=True)
+class Rims:
+    """The straight edges of N surfels, up to two of each.
+
+    Attributes:
+        places: (N, 2, 3) of each edge the point that is nearest to the surfel's centre.
+        outward: (N, 2, 3) unit, in the surfel's plane.
+        known: (N, 2) bool, false where a surfel has no such edge.
+    """
+
+    places: np.ndarray
+    outward: np.ndarray
+    known: np.ndarray
+
+    @classmethod
+    def of(cls, surfels: Surfels) -> Rims:
+        """Those of some surfels."""
+        axes = quaternion_to_axes(surfels.rotations.double()).cpu().numpy()[:, :2]
+        offsets, angles = (part.double().cpu().numpy() for part in (surfels.clip_offsets, surfels.clip_angles))
+        known = offsets < NO_CLIP
+        outward = np.cos(angles)[..., None] * axes[:, :1] + np.sin(angles)[..., None] * axes[:, 1:]
+        centers = surfels.centers.double().cpu().numpy()[:, None]
+        return cls(centers + np.where(known, offsets, 0.0)[..., None] * outward, outward, known)
+
+    def chosen(self, which: np.ndarray) -> Rims:
+        """Those of some of the surfels."""
+        return Rims(self.places[which], self.outward[which], self.known[which])
+
+    def towards(self, direction: np.ndarray) -> np.ndarray:
+        """(K, 3) places of those that face the way of a unit `direction` (3,)."""
+        return self.places[self.known & (self.outward @ direction > np.cos(TURN))]
