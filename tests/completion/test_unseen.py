@@ -49,16 +49,18 @@ def closed(seen: Surfels) -> Surfels:
     return with_unseen_surfaces(seen, cameras_in_front())
 
 
-def equal(first: Surfels, second: Surfels) -> bool:
+def equal(first: Surfels, second: Surfels, but: tuple[str, ...] = ()) -> bool:
     other = second.tensors()
-    return all(torch.equal(tensor, other[name]) for name, tensor in first.tensors().items())
+    return all(torch.equal(tensor, other[name]) for name, tensor in first.tensors().items() if name not in but)
 
 
 def test_the_back_of_a_box_that_no_camera_saw_gets_surfels_and_nothing_else_does(
     seen: Surfels, closed: Surfels
 ) -> None:
     centers, normals = closed.centers[len(seen) :], closed.normals[len(seen) :]
-    assert equal(only(closed, slice(len(seen))), seen) and not bool(seen.guessed.any())
+    # But where faces meet, what was seen ends there.
+    assert equal(only(closed, slice(len(seen))), seen, ("clip_offsets", "clip_angles"))
+    assert not bool(seen.guessed.any())
     assert bool((closed.guessed[len(seen) :] > 0.0).all())
     assert 10 <= len(centers) <= 36  # measured 16; of the 36 that are missing those at the edges have neighbours
     # Measured 0.0 and −0.87 distances: where surfels are so far apart the room reaches a little into the box.

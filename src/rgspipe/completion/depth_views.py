@@ -79,8 +79,10 @@ class DepthViews:
         Args:
             near: rays that end within this of the plane end on the surface.
         """
+        if not self.cameras:
+            return None
         pairs = [_met(camera, depth, strip, near) for camera, depth in zip(self.cameras, self.depths, strict=True)]
-        past, ended = (np.concatenate(parts) for parts in zip(*pairs, strict=True)) if pairs else (np.empty(0),) * 2
+        past, ended = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
         if min(ended.sum(), (~ended).sum()) < FEWEST:
             return None
         order = np.argsort(past, kind="stable")
@@ -96,7 +98,7 @@ class DepthViews:
 
 
 def _met(camera: Camera, depth: np.ndarray, strip: Strip, near: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of rays that meet the strip from its front how far past its middle (R,), and (R,) bool, whether they end there."""
+    """Of rays that meet the strip from its front how far past its middle (R,), and whether they end there (R,)."""
     pose = camera.camera_to_world.double().cpu().numpy()
     rotation, origin = pose[:3, :3], pose[:3, 3]
     height = float((origin - strip.middle) @ strip.normal)

@@ -274,10 +274,10 @@ def _past(sheet: Sheet, places: np.ndarray, along: np.ndarray, outward: np.ndarr
     if not beside.any():
         return None
     last = float(np.quantile(offset[beside], LAST)) + PAST * spacing
-    first = float(places[0] @ along)
-    strip = Strip(places[0], along, outward, sheet.raster.normal, (low - first, high - first), AROUND * spacing)
-    shown = space.depth_views.edge_in(strip, ON_SURFACE * spacing)
-    return last if shown is None else shown
+    first, middle = float(places[0] @ along), places[0] + last * outward
+    strip = Strip(middle, along, outward, sheet.raster.normal, (low - first, high - first), AROUND * spacing)
+    further = space.depth_views.edge_in(strip, ON_SURFACE * spacing)
+    return last + (further or 0.0)
 
 
 def _reach(run: np.ndarray, goes_on: np.ndarray) -> np.ndarray:
