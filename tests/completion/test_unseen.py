@@ -82,9 +82,16 @@ def test_they_reflect_as_their_neighbours_do(seen: Surfels, closed: Surfels) -> 
     assert float((albedo - ends[1]).abs().mean()) < 0.1
 
 
+def is_left_alone(closed: Surfels, room: Surfels) -> bool:
+    """Whether nothing is added; faces end where they meet, which the nearest ends of exact surfels do already."""
+    same = equal(closed, room, ("clip_offsets", "clip_angles"))
+    cut = room.clip_offsets[:, 0] < SPACING
+    off = (closed.clip_offsets - room.clip_offsets)[cut, 0].abs()
+    return same and bool(cut.any()) and float(off.max()) < 1e-9
+
+
 def test_a_room_that_was_seen_entirely_is_left_alone() -> None:
-    room = true_room()
-    assert with_unseen_surfaces(room, cameras_all_around()) is room
+    assert is_left_alone(with_unseen_surfaces(true_room(), cameras_all_around()), true_room())
 
 
 def test_without_cameras_or_with_a_handful_of_surfels_nothing_is_known(seen: Surfels) -> None:
@@ -156,7 +163,7 @@ def test_an_open_front_through_which_the_cameras_looked_stays_open() -> None:
 def test_room_that_a_thing_hides_stays_open() -> None:
     """The box hides what is behind it from cameras in front: a wall at the limit of sight would stand in the room."""
     room = true_room()
-    assert with_unseen_surfaces(room, cameras_in_front()[:4]) is room
+    assert is_left_alone(with_unseen_surfaces(room, cameras_in_front()[:4]), room)
 
 
 def test_what_bounds_room_that_a_thing_hides_is_closed() -> None:

@@ -117,6 +117,9 @@ def _edges(away: np.ndarray, facing: np.ndarray, normal: np.ndarray) -> list[End
         there = facing[nearest]
         alike = others & (facing @ there > ACROSS) & (np.abs((away - away[nearest]) @ there) < ON_PLANE)
         others = others & ~alike
+        # All of them tell it: where depth is noisy single ones are turned by degrees.
+        there = facing[alike].mean(axis=0)
+        there = there / np.linalg.norm(there)
         plane = float((away[alike] @ there).mean())
         if _behind(own @ there - plane) and _behind(height[alike]):
             outward = there - (there @ normal) * normal

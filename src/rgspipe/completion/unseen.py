@@ -72,7 +72,7 @@ def with_unseen_surfaces(
 ) -> Surfels:
     """The surfels and, after them, those of surfaces that no camera saw.
 
-    Objects in empty space get the sides that things must have, and no walls.
+    Objects in empty space get the sides that things must have, and no walls. All end where their faces meet.
 
     Args:
         surfels: N ≥ 2 of a scene that `cameras` saw.
@@ -98,13 +98,12 @@ def with_unseen_surfaces(
         found = _unseen_of_room(along, planes, space, inside, spacing, hidden)
     else:
         found = _unseen_of_object(along, planes, space, spacing)
-    if not len(found):
-        return surfels
-    if hidden:
+    if hidden and len(found):
         log.info("%d surfels close the scene where no camera saw what is there.", len(found))
     axes = frame.numpy()
-    closed = _ended(_joined(surfels, found.places @ axes, found.normals @ axes, spacing), len(surfels), spacing)
-    return replace(closed, guessed=doubts_of_guesses(closed))
+    whole = _joined(surfels, found.places @ axes, found.normals @ axes, spacing) if len(found) else surfels
+    closed = _ended(whole, len(surfels), spacing)
+    return replace(closed, guessed=doubts_of_guesses(closed)) if len(found) else closed
 
 
 def _unseen_of_object(surfels: Surfels, planes: Sequence[Plane], space: SeenSpace, spacing: float) -> Continued:
