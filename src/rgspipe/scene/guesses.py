@@ -71,23 +71,30 @@ def labels_of_guesses(surfels: Surfels) -> Tensor:
 
 @dataclass(frozen=True)
 class GuessedSurfaces:
-    """The surfaces that no camera saw, and those that were seen whose planes they go on in.
+    """The surfaces that no camera saw, and those that were seen which they go on from.
 
     Attributes:
         labels: (N,) int64, as of `labels_of_guesses`.
-        kin: for each of the surfaces the surfels (K,) int64 that cameras saw in its plane; none where it is too bent,
-            or where fewer are seen than KIN of what is guessed.
+        kin: for each of the surfaces the surfels (K,) int64 that cameras saw in its plane; where it is bent, or where
+            fewer are seen than KIN of what is guessed, those of the same thing that it touches.
+        in_plane: for each of them which it is.
+        edges: (E, 2) int64 surfels that cameras saw on both sides of edges of things.
     """
 
     labels: Tensor
     kin: tuple[Tensor, ...]
+    in_plane: tuple[bool, ...]
+    edges: Tensor
 
     @classmethod
     def of(cls, surfels: Surfels) -> GuessedSurfaces:
         """Those of surfels that know which of them are guessed."""
         labels = labels_of_guesses(surfels)
         centers, normals, spacing = surfels.centers.double(), surfels.normals.double(), _spacing(surfels)
-        seen, kin = surfels.guessed == 0.0, []
+        seen, kin, in_plane = surfels.guessed == 0.0, [], []
+        smooth, convex = _touching(centers, normals, spacing)
+        near = torch.cat([smooth, convex])
+        near = torch.cat([near, near.flip(1)])
         for label in range(int(labels.max()) + 1):
             own = labels == label
             normal = normals[own].mean(dim=0)
@@ -95,26 +102,35 @@ class GuessedSurfaces:
             height = (centers - centers[own].mean(dim=0)) @ normal
             alike = seen & (height.abs() <= spacing) & (normals @ normal > FLAT)
             enough = flat and int(alike.sum()) >= KIN * int(own.sum())
-            kin.append(alike.nonzero()[:, 0] if enough else labels[:0])
-        return cls(labels, tuple(kin))
+            touched = near[own[near[:, 0]] & seen[near[:, 1]], 1].unique()
+            kin.append(alike.nonzero()[:, 0] if enough else touched)
+            in_plane.append(enough)
+        return cls(labels, tuple(kin), tuple(in_plane), convex[seen[convex].all(dim=1)])
 
     def expected(self, albedo: Tensor) -> tuple[Tensor, Tensor]:
         """(N, 3) albedo that guessed surfels should have if others have `albedo` (N, 3), the median of their kin, and
-        (N, 1) how much its logarithm is in doubt: as much as among these. NaN where there are none, and where seen."""
+        (N, 1) how much its logarithm is in doubt: in a plane as much as among these, and on another side of a thing as
+        much as sides of things differ that were seen. NaN where there are none, and where seen."""
         found = torch.full_like(albedo, torch.nan)
         doubt = torch.full_like(albedo[:, :1], torch.nan)
-        for label, kin in enumerate(self.kin):
-            if len(kin):
+        for label, (kin, in_plane) in enumerate(zip(self.kin, self.in_plane, strict=True)):
+            if len(kin) and (in_plane or len(self.edges)):
                 own = self.labels == label
                 found[own] = albedo[kin].median(dim=0).values
-                doubt[own] = _spread(albedo[kin])
+                doubt[own] = _spread(albedo[kin]) if in_plane else self._across_edges(albedo)
         return found, doubt
+
+    def _across_edges(self, albedo: Tensor) -> Tensor:
+        """() root mean square of what the logarithm of albedo (N, 3) differs by from side to side of seen things."""
+        grey = albedo.mean(dim=1).clamp(min=1e-3).log()[self.edges]
+        return (grey[:, 0] - grey[:, 1]).square().mean().sqrt().clamp(min=LEAST_DOUBT)
 
 
 def doubts_of_guesses(surfels: Surfels) -> Tensor:
     """(N,) how much the logarithm of the albedo of guessed surfels is in doubt; 0 for those that cameras saw.
 
-    Of surfaces that go on in the plane of others it is the spread of these, else that of all that was seen.
+    Of surfaces that go on in the plane of others it is the spread of these, of other sides of things that of their
+    sides, and else that of all that was seen.
     """
     _, doubt = GuessedSurfaces.of(surfels).expected(surfels.albedo)
     doubt = torch.where(doubt[:, 0].isfinite(), doubt[:, 0], spread_of_albedo(surfels))
@@ -127,6 +143,19 @@ def _spacing(surfels: Surfels) -> float:
         return surfel_spacing(surfels.centers.cpu(), surfels.normals.cpu())
     except ValueError:
         return 0.0
+
+
+def _touching(centers: Tensor, normals: Tensor, spacing: float) -> tuple[Tensor, Tensor]:
+    """Pairs (P, 2) and (Q, 2) int64 of near surfels: of a smooth surface, and of two sides of a thing.
+
+    What a thing turns outwards lies behind the planes of its other sides.
+    """
+    pairs = torch.from_numpy(cKDTree(centers.cpu().numpy()).query_pairs(TOGETHER * spacing, output_type="ndarray"))
+    pairs = pairs.to(centers.device)
+    first, second = pairs.T
+    away, cosine = centers[second] - centers[first], (normals[first] * normals[second]).sum(dim=1)
+    behind = ((away * normals[first]).sum(dim=1) < 0.0) & ((away * normals[second]).sum(dim=1) > 0.0)
+    return pairs[cosine > TURNED], pairs[(cosine.abs() <= TURNED) & behind]
 
 
 def _together(centers: Tensor, normals: Tensor, spacing: float) -> Tensor:
