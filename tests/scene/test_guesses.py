@@ -17,6 +17,7 @@ from rgspipe.scene.guesses import (
     guessed_surfaces,
     spread_of_albedo,
 )
+from rgspipe.scene.rectangles import solid_box, surfels_on
 from rooms import closed_box
 
 
@@ -85,3 +86,39 @@ def test_a_strip_of_a_wall_tells_nothing_of_a_wall_twenty_times_as_large():
     hidden = guessed_where(box, floor & (x > low + 1e-6))
     expected, _ = GuessedSurfaces.of(hidden).expected(box.albedo)
     assert not bool(expected.isfinite().any())
+
+
+def solid(colours: list[list[float]]) -> Surfels:
+    """A box in the open of 1 × 1 × 1, its six faces in these colours, whose face y = 1 is guessed."""
+    made = surfels_on(solid_box([0.5, 0.5, 0.5], [1.0, 1.0, 1.0], [0.5, 0.5, 0.5]), 600)
+    faces = torch.eye(3, dtype=torch.float64)
+    albedo = made.albedo.clone()
+    for face, colour in enumerate(colours):
+        along = made.normals.double() @ faces[face // 2] * (1.0 if face % 2 else -1.0)
+        albedo[along > 0.9] = torch.tensor(colour).to(albedo)
+    back = made.normals[:, 1] > 0.9
+    albedo[back] = 0.1
+    return guessed_where(replace(made, albedo=albedo), back)
+
+
+def test_another_side_of_a_thing_is_expected_to_be_like_those_that_were_seen() -> None:
+    things = solid([[0.6, 0.4, 0.3]] * 6)
+    back = things.guessed > 0.0
+    found, doubt = GuessedSurfaces.of(things).expected(things.albedo)
+    torch.testing.assert_close(found[back], torch.tensor([0.6, 0.4, 0.3]).to(found).expand(int(back.sum()), 3))
+    assert float(doubt[back].max()) == pytest.approx(LEAST_DOUBT)  # all sides are alike
+    assert bool(found[~back].isnan().all())
+
+
+def test_it_is_doubted_as_much_as_sides_differ_that_were_seen() -> None:
+    """Sides x = 0 and x = 1 are darker than the others by a half: of eight edges that were seen four have both."""
+    things = solid([[0.3] * 3] * 2 + [[0.6] * 3] * 4)
+    doubt = doubts_of_guesses(things)[things.guessed > 0.0]
+    # Of the edges between x and z, and x and the front, six of eight; the others are of one colour.
+    assert float(doubt.max()) == float(doubt.min()) == pytest.approx(math.log(2.0) * math.sqrt(0.75), rel=0.05)
+
+
+def test_walls_that_meet_in_a_corner_tell_nothing_of_each_other(box) -> None:
+    wall = box.normals[:, 0] > 0.9
+    found, _ = GuessedSurfaces.of(guessed_where(box, wall)).expected(box.albedo)
+    assert bool(found.isnan().all())
