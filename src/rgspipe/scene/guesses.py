@@ -75,8 +75,9 @@ class GuessedSurfaces:
 
     Attributes:
         labels: (N,) int64, as of `labels_of_guesses`.
-        kin: for each of the surfaces the surfels (K,) int64 that cameras saw in its plane; where it is bent, or where
-            fewer are seen than KIN of what is guessed, those of the same thing that it touches.
+        kin: for each of the surfaces the surfels (K,) int64 that cameras saw in its plane; where fewer are seen than
+            KIN of what is guessed, those of the thing's other sides that it touches; and where it is bent, of the same
+            side as well.
         in_plane: for each of them which it is.
         edges: (E, 2) int64 surfels that cameras saw on both sides of edges of things.
     """
@@ -93,8 +94,6 @@ class GuessedSurfaces:
         centers, normals, spacing = surfels.centers.double(), surfels.normals.double(), _spacing(surfels)
         seen, kin, in_plane = surfels.guessed == 0.0, [], []
         smooth, convex = _touching(centers, normals, spacing)
-        near = torch.cat([smooth, convex])
-        near = torch.cat([near, near.flip(1)])
         for label in range(int(labels.max()) + 1):
             own = labels == label
             normal = normals[own].mean(dim=0)
@@ -102,6 +101,8 @@ class GuessedSurfaces:
             height = (centers - centers[own].mean(dim=0)) @ normal
             alike = seen & (height.abs() <= spacing) & (normals @ normal > FLAT)
             enough = flat and int(alike.sum()) >= KIN * int(own.sum())
+            near = convex if flat else torch.cat([smooth, convex])
+            near = torch.cat([near, near.flip(1)])
             touched = near[own[near[:, 0]] & seen[near[:, 1]], 1].unique()
             kin.append(alike.nonzero()[:, 0] if enough else touched)
             in_plane.append(enough)

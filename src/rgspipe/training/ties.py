@@ -1,4 +1,4 @@
-"""Surfaces that no camera saw, while the albedo is solved: each is of one colour, about that of its plane."""
+"""Surfaces that no camera saw, while the albedo is solved: each is of one colour, about that of its plane or thing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ class Ties:
 
     What a guessed surface does to images it does by the light that it sends back, which hardly tells its parts apart;
     each on its own they would end as black and white patches. One that goes on in the plane of surfaces that cameras
-    saw is expected to be like these, within their own spread.
+    saw is expected to be like these, within their own spread, and another side of a thing to be like those that it
+    touches.
     """
 
     def __init__(self, surfels: Surfels) -> None:
