@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rgspipe.completion.rasters import ACROSS
-from rgspipe.completion.rims import TURN, Rims
+from rgspipe.completion.rims import Rims
 from rgspipe.scene.surfels import NO_CLIP
 
 #: Surfels of other faces are looked for so far from a surfel, and those of the two faces to tell how these lie to each
@@ -29,6 +29,9 @@ ON_PLANE = 0.5
 
 #: A face that goes on so many distances past another's plane does not end there.
 GOES_ON = 2.0
+
+#: Ends of a surfel whose directions are within this angle [rad] are at one edge.
+TURN = np.radians(20.0)
 
 #: Edges a surfel can have.
 MOST = 2
@@ -72,9 +75,7 @@ def ends(centers: np.ndarray, normals: np.ndarray, axes: np.ndarray, rims: Rims,
         for own, near in zip(chosen, lists, strict=True):
             around = np.asarray(near)
             own_ends = [
-                (float((place - centers[own]) @ outward) / spacing, outward)
-                for place, outward, known in zip(rims.places[own], rims.outward[own], rims.known[own], strict=True)
-                if known
+                (float((place - centers[own]) @ outward) / spacing, outward) for place, outward in rims.ends(own)
             ]
             edges = _edges((centers[around] - centers[own]) / spacing, normals[around], normals[own])
             if own < seen:

@@ -8,9 +8,6 @@ import numpy as np
 
 from rgspipe.scene.surfels import NO_CLIP, Surfels, quaternion_to_axes
 
-#: Rims that face within this angle [rad] of each other may be of one edge.
-TURN = np.radians(20.0)
-
 
 @dataclass(frozen=True)
 class Rims:
@@ -36,10 +33,6 @@ class Rims:
         centers = surfels.centers.double().cpu().numpy()[:, None]
         return cls(centers + np.where(known, offsets, 0.0)[..., None] * outward, outward, known)
 
-    def chosen(self, which: np.ndarray) -> Rims:
-        """Those of some of the surfels."""
-        return Rims(self.places[which], self.outward[which], self.known[which])
-
-    def towards(self, direction: np.ndarray) -> np.ndarray:
-        """(K, 3) places of those that face the way of a unit `direction` (3,)."""
-        return self.places[self.known & (self.outward @ direction > np.cos(TURN))]
+    def ends(self, surfel: int) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Places (3,) and outward directions (3,) of those of one surfel."""
+        return [(self.places[surfel, edge], self.outward[surfel, edge]) for edge in np.flatnonzero(self.known[surfel])]
