@@ -6,7 +6,7 @@ faces that a thing turns outwards lie behind each other's planes, so each is cut
 
 Surfels that cameras saw are cut by depth and photographs already (`training.initialise.edges`, `training.refine`), each
 for itself: of those along an edge the ones that reach farthest cast its shadow, a fifteenth of a distance too wide.
-Planes are known far better, so where two meet they say where the edge is.
+Planes are known far better, so where two of them meet that were seen they say where the edge is.
 """
 
 from __future__ import annotations
@@ -74,6 +74,8 @@ def ends(centers: np.ndarray, normals: np.ndarray, axes: np.ndarray, rims: Rims,
         lists = tree.query_ball_point(centers[chosen], AROUND * spacing, return_sorted=True)
         for own, near in zip(chosen, lists, strict=True):
             around = np.asarray(near)
+            # What is guessed may be wrong, and says nothing of where others end that were seen.
+            around = around[around < seen] if own < seen else around
             own_ends = [
                 (float((place - centers[own]) @ outward) / spacing, outward) for place, outward in rims.ends(own)
             ]

@@ -76,8 +76,8 @@ class GuessedSurfaces:
     Attributes:
         labels: (N,) int64, as of `labels_of_guesses`.
         kin: for each of the surfaces the surfels (K,) int64 that cameras saw in its plane; where fewer are seen than
-            KIN of what is guessed, those of the thing's other sides that it touches; and where it is bent, of the same
-            side as well.
+            KIN of what is guessed, those of the thing's other sides that it touches. None where it is bent: guesses on
+            two things that are sunk into each other may be one bent surface.
         in_plane: for each of them which it is.
         edges: (E, 2) int64 surfels that cameras saw on both sides of edges of things.
     """
@@ -93,7 +93,8 @@ class GuessedSurfaces:
         labels = labels_of_guesses(surfels)
         centers, normals, spacing = surfels.centers.double(), surfels.normals.double(), _spacing(surfels)
         seen, kin, in_plane = surfels.guessed == 0.0, [], []
-        smooth, convex = _touching(centers, normals, spacing)
+        convex = _edges_of_things(centers, normals, spacing)
+        near = torch.cat([convex, convex.flip(1)])
         for label in range(int(labels.max()) + 1):
             own = labels == label
             normal = normals[own].mean(dim=0)
@@ -101,10 +102,8 @@ class GuessedSurfaces:
             height = (centers - centers[own].mean(dim=0)) @ normal
             alike = seen & (height.abs() <= spacing) & (normals @ normal > FLAT)
             enough = flat and int(alike.sum()) >= KIN * int(own.sum())
-            near = convex if flat else torch.cat([smooth, convex])
-            near = torch.cat([near, near.flip(1)])
-            touched = near[own[near[:, 0]] & seen[near[:, 1]], 1].unique()
-            kin.append(alike.nonzero()[:, 0] if enough else touched)
+            sides = near[own[near[:, 0]] & seen[near[:, 1]], 1].unique()
+            kin.append(alike.nonzero()[:, 0] if enough else sides if flat else labels[:0])
             in_plane.append(enough)
         return cls(labels, tuple(kin), tuple(in_plane), convex[seen[convex].all(dim=1)])
 
@@ -146,17 +145,14 @@ def _spacing(surfels: Surfels) -> float:
         return 0.0
 
 
-def _touching(centers: Tensor, normals: Tensor, spacing: float) -> tuple[Tensor, Tensor]:
-    """Pairs (P, 2) and (Q, 2) int64 of near surfels: of a smooth surface, and of two sides of a thing.
-
-    What a thing turns outwards lies behind the planes of its other sides.
-    """
+def _edges_of_things(centers: Tensor, normals: Tensor, spacing: float) -> Tensor:
+    """(Q, 2) int64 pairs of near surfels of two sides of a thing: each is behind the plane of the other."""
     pairs = torch.from_numpy(cKDTree(centers.cpu().numpy()).query_pairs(TOGETHER * spacing, output_type="ndarray"))
     pairs = pairs.to(centers.device)
     first, second = pairs.T
     away, cosine = centers[second] - centers[first], (normals[first] * normals[second]).sum(dim=1)
     behind = ((away * normals[first]).sum(dim=1) < 0.0) & ((away * normals[second]).sum(dim=1) > 0.0)
-    return pairs[cosine > TURNED], pairs[(cosine.abs() <= TURNED) & behind]
+    return pairs[(cosine.abs() <= TURNED) & behind]
 
 
 def _together(centers: Tensor, normals: Tensor, spacing: float) -> Tensor:
