@@ -129,11 +129,14 @@ class GuessedSurfaces:
 def doubts_of_guesses(surfels: Surfels) -> Tensor:
     """(N,) how much the logarithm of the albedo of guessed surfels is in doubt; 0 for those that cameras saw.
 
-    Of surfaces that go on in the plane of others it is the spread of these, of other sides of things that of their
-    sides, and else that of all that was seen.
+    Of surfaces that go on in the plane of others it is the spread of these, else that of all that was seen: that sides
+    of things are alike is expected, but that the one which nobody saw is like them no image tells.
     """
-    _, doubt = GuessedSurfaces.of(surfels).expected(surfels.albedo)
-    doubt = torch.where(doubt[:, 0].isfinite(), doubt[:, 0], spread_of_albedo(surfels))
+    surfaces = GuessedSurfaces.of(surfels)
+    _, doubt = surfaces.expected(surfels.albedo)
+    labels = surfaces.labels
+    planes = torch.tensor([*surfaces.in_plane, False], device=labels.device)[labels]
+    doubt = torch.where(planes, doubt[:, 0], spread_of_albedo(surfels))
     return torch.where(surfels.guessed > 0.0, doubt, 0.0)
 
 
