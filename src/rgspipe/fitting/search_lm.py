@@ -56,9 +56,10 @@ def polished(
     if not bool((best.intensity[: len(best.emitters)] > 0).any()):
         return _without_lights(refiner.problem, meter)
     findings = _findings(found, refiner, best, options, spec)
-    # Whoever begins elsewhere than at the scene's candidates need not have any: they take seconds.
-    frozen, shadows = refiner.problem.views.frozen, refiner.problem.model.effects.shadows
-    findings = (*findings, *behind_surfaces(best.lights(refiner.problem), frozen, shadows))
+    # Whoever begins elsewhere than at the scene's candidates need not have any: they take seconds. The scene that was
+    # searched has them; in which bright spots are seen well, they would be made anew.
+    scene, shadows = problem.views.frozen, problem.model.effects.shadows
+    findings = (*findings, *behind_surfaces(best.lights(refiner.problem), scene, shadows))
     costs = Costs.of(found.refiner, found.compared)
     return _result(refiner, best, findings, costs, options, others, found.weighed)
 

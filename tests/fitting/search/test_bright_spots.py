@@ -9,6 +9,8 @@ import torch
 
 import rgspipe as rg
 from rgspipe.fitting import FitViews
+from rgspipe.renderer import frozen
+from rgspipe.renderer.dictionary import build_dictionary
 from rgspipe.renderer.frozen import FrozenScene
 
 #: Of a room whose ceiling no camera sees.
@@ -94,3 +96,17 @@ def test_a_refit_sees_spots_as_a_fit_does(scene: FrozenScene, truth: FrozenScene
     found = views.fit(images)
     again = views.refit(images, found.lights)
     assert again.lights[0].position.tolist() == pytest.approx(found.lights[0].position.tolist(), abs=1e-3)
+
+
+def test_candidates_are_made_once(scene: FrozenScene, truth: FrozenScene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a scene that has none yet: half a minute each in a large one."""
+    made = []
+
+    def counted(*given, **named):
+        made.append(given)
+        return build_dictionary(*given, **named)
+
+    monkeypatch.setattr(frozen, "build_dictionary", counted)
+    lamp, fresh = rg.PointLight([0.13, 0.11, 0.45], 1.0), replace(scene)
+    rg.fit_lights(fresh, CAMERAS, [truth.render(camera, lamp) for camera in CAMERAS])
+    assert len(made) == 1
