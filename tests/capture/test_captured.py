@@ -71,7 +71,7 @@ def test_lamps_that_are_looked_for_on_a_part_of_the_surfels_are_the_same() -> No
     assert len(again.answer.best.problem.radiance) == len(found().surfels)
     pairs = match_positions(*(np.stack([lamp.position.numpy() for lamp in one.lamps]) for one in (again, found())))
     apart = [float((again.lamps[own].position - found().lamps[other].position).norm()) for own, other in pairs]
-    assert max(apart) < 0.002 * found().frozen.size, apart  # 0.0010; 0.0006 before channels were drawn side by side
+    assert max(apart) < 0.005 * found().frozen.size, apart  # 0.0029; 0.0010 before faces ended where they meet
     assert errors(again)[0].max() < 0.008  # 0.0054
 
 
