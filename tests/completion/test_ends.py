@@ -7,7 +7,6 @@ import pytest
 import torch
 
 from rgspipe.completion.ends import ends
-from rgspipe.completion.rims import Rims
 from rgspipe.completion.unseen import SCALE
 from rgspipe.renderer.kernels.composite import composite
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -30,15 +29,16 @@ def face(axis: int, sign: float, low: tuple[float, float], high: tuple[float, fl
     return places, np.broadcast_to(normal, places.shape)
 
 
-def no_rims(count: int) -> Rims:
-    return Rims(np.zeros((count, 2, 3)), np.zeros((count, 2, 3)), np.zeros((count, 2), dtype=bool))
+def nowhere(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Offsets and angles of surfels of which no end is known."""
+    return np.full((count, 2), NO_CLIP), np.zeros((count, 2))
 
 
 def found(parts):
     """Places, normals, axes and ends of all surfels of some faces, which were guessed."""
     places, normals = (np.concatenate([part[index] for part in parts]) for index in (0, 1))
     axes = quaternion_to_axes(quaternion_from_normal(torch.from_numpy(normals))).numpy()[:, :2]
-    return places, normals, axes, ends(places, normals, axes, no_rims(len(places)), 0, SPACING)
+    return places, normals, axes, ends(places, normals, axes, *nowhere(len(places)), 0, SPACING)
 
 
 def cut(parts, number: int) -> np.ndarray:
@@ -134,7 +134,7 @@ def seen_cube(errors: np.ndarray) -> tuple[Surfels, Surfels]:
     offsets = np.where(whole.offsets < NO_CLIP, np.maximum(whole.offsets + off, 0.1 * SPACING), NO_CLIP)
     photographed = surfels_of(places, normals, offsets, whole.angles, whole.kept).to(torch.float64)
     axes = quaternion_to_axes(photographed.rotations).numpy()[:, :2]
-    result = ends(places, normals, axes, Rims.of(photographed), len(places), SPACING)
+    result = ends(places, normals, axes, offsets, whole.angles, len(places), SPACING)
     return photographed, surfels_of(places, normals, result.offsets, result.angles, result.kept)
 
 
@@ -156,6 +156,6 @@ def test_a_surfel_that_was_seen_to_end_elsewhere_keeps_its_end() -> None:
 
 
 def test_without_surfels_nothing_ends() -> None:
-    nothing = ends(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2, 3)), no_rims(0), 0, SPACING)
+    nothing = ends(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2, 3)), *nowhere(0), 0, SPACING)
     assert len(nothing.kept) == 0
     assert nothing.offsets.shape == (0, 2)

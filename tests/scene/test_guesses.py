@@ -111,11 +111,11 @@ def test_another_side_of_a_thing_is_expected_to_be_like_those_that_were_seen() -
 
 
 def test_it_is_doubted_as_much_as_sides_differ_that_were_seen() -> None:
-    """Sides x = 0 and x = 1 are darker than the others by a half: of eight edges that were seen four have both."""
+    """Sides x = 0 and x = 1 are half as bright as the others."""
     things = solid([[0.3] * 3] * 2 + [[0.6] * 3] * 4)
     back = things.guessed > 0.0
     doubt = GuessedSurfaces.of(things).expected(things.albedo)[1][back]
-    # Of the edges between x and z, and x and the front, six of eight; the others are of one colour.
+    # Of eight edges between sides that were seen six have one of these on one side.
     assert float(doubt.max()) == float(doubt.min()) == pytest.approx(math.log(2.0) * math.sqrt(0.75), rel=0.05)
     # A fit doubts it as much as anything that was not seen.
     doubts = doubts_of_guesses(things)

@@ -66,11 +66,8 @@ class DepthViews:
     @classmethod
     def of(cls, cameras: Sequence[Camera], depths: Sequence[Tensor | None]) -> DepthViews:
         """Those of some photographs that have depth."""
-        known = [
-            (camera, depth.double().cpu().numpy())
-            for camera, depth in zip(cameras, depths, strict=False)
-            if depth is not None
-        ]
+        pairs = zip(cameras, depths, strict=True)
+        known = [(camera, depth.cpu().numpy()) for camera, depth in pairs if depth is not None]
         return cls(tuple(camera for camera, _ in known), tuple(depth for _, depth in known))
 
     def edge_in(self, strip: Strip, near: float) -> float | None:
@@ -116,7 +113,7 @@ def _met(camera: Camera, depth: np.ndarray, strip: Strip, near: float) -> tuple[
     across, down = (column + 0.5 - camera.cx) / camera.fx, (row + 0.5 - camera.cy) / camera.fy
     # Of planar depth 1, so that depths are lengths along them.
     rays = np.stack([across, -down, -np.ones(len(across))], axis=1) @ rotation.T
-    measured, towards = depth[row, column], -(rays @ strip.normal)
+    measured, towards = depth[row, column].astype(np.float64), -(rays @ strip.normal)
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = height / towards
         place = origin + reach[:, None] * rays - strip.middle

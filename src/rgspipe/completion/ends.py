@@ -17,7 +17,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from rgspipe.completion.rasters import ACROSS
-from rgspipe.completion.rims import Rims
 from rgspipe.scene.surfels import NO_CLIP
 
 #: Surfels of other faces are looked for so far from a surfel, and those of the two faces to tell how these lie to each
@@ -58,16 +57,25 @@ class Ends:
 End = tuple[float, np.ndarray]
 
 
-def ends(centers: np.ndarray, normals: np.ndarray, axes: np.ndarray, rims: Rims, seen: int, spacing: float) -> Ends:
+def ends(
+    centers: np.ndarray,
+    normals: np.ndarray,
+    axes: np.ndarray,
+    offsets: np.ndarray,
+    angles: np.ndarray,
+    seen: int,
+    spacing: float,
+) -> Ends:
     """Of surfels at `centers` (N, 3) with unit `normals` (N, 3), of which cameras saw the first `seen`.
 
     Args:
         axes: (N, 2, 3) in-plane axes u and v.
-        rims: where they end as far as is known.
+        offsets, angles: (N, 2) how they end as far as is known, as of `Surfels`.
         spacing: distance of neighbours.
     """
     count = len(centers)
     found = Ends(np.ones(count, dtype=bool), np.full((count, MOST), NO_CLIP), np.zeros((count, MOST)))
+    outward = np.cos(angles)[..., None] * axes[:, :1] + np.sin(angles)[..., None] * axes[:, 1:]
     tree = cKDTree(centers)
     for first in range(0, count, AT_ONCE):
         chosen = np.arange(first, min(first + AT_ONCE, count))
@@ -76,17 +84,15 @@ def ends(centers: np.ndarray, normals: np.ndarray, axes: np.ndarray, rims: Rims,
             around = np.asarray(near)
             # What is guessed may be wrong, and says nothing of where others end that were seen.
             around = around[around < seen] if own < seen else around
-            own_ends = [
-                (float((place - centers[own]) @ outward) / spacing, outward) for place, outward in rims.ends(own)
-            ]
+            known = [(offsets[own, k] / spacing, outward[own, k]) for k in np.flatnonzero(offsets[own] < NO_CLIP)]
             edges = _edges((centers[around] - centers[own]) / spacing, normals[around], normals[own])
             if own < seen:
-                edges = _agreed(edges, own_ends)
-            rest = [end for end in own_ends if not any(_is_along(end, edge) for edge in edges)]
-            for place, (offset, outward) in enumerate(sorted([*edges, *rest], key=lambda end: end[0])[:MOST]):
+                edges = _agreed(edges, known)
+            rest = [end for end in known if not any(_is_along(end, edge) for edge in edges)]
+            for place, (offset, way) in enumerate(sorted([*edges, *rest], key=lambda end: end[0])[:MOST]):
                 found.kept[own] &= own < seen or offset > 0.0
                 found.offsets[own, place] = spacing * offset
-                found.angles[own, place] = np.arctan2(outward @ axes[own, 1], outward @ axes[own, 0])
+                found.angles[own, place] = np.arctan2(way @ axes[own, 1], way @ axes[own, 0])
     return found
 
 

@@ -95,7 +95,7 @@ class SeenSpace:
         reduced = tuple(camera.reduced(LONGEST_SIDE) for camera in cameras)
         known = depths or [None] * len(reduced)
         reaches = tuple(_reach(bvh, *one) for one in zip(reduced, known, strict=True))
-        return cls(reduced, reaches, DepthViews.of(cameras, depths))
+        return cls(reduced, reaches, DepthViews.of(cameras, known))
 
     def holds(self, points: Tensor, margin: float, *, around: bool = False) -> Tensor:
         """(P,) bool: points (P, 3) that lie nearer to a camera, by `margin`, than the surface behind them.

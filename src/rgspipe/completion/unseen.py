@@ -24,7 +24,6 @@ from rgspipe.completion.free_space import Grid, SeenSpace
 from rgspipe.completion.hidden_room import parts_in_sight, with_hidden_room
 from rgspipe.completion.planes import Plane, frame_of, planes_of
 from rgspipe.completion.rasters import BARE, Continued
-from rgspipe.completion.rims import Rims
 from rgspipe.completion.round_things import round_things
 from rgspipe.completion.structure import continued
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
@@ -101,9 +100,8 @@ def with_unseen_surfaces(
     if hidden and len(found):
         log.info("%d surfels close the scene where no camera saw what is there.", len(found))
     axes = frame.numpy()
-    whole = _joined(surfels, found.places @ axes, found.normals @ axes, spacing) if len(found) else surfels
-    closed = _ended(whole, len(surfels), spacing)
-    return replace(closed, guessed=doubts_of_guesses(closed)) if len(found) else closed
+    closed = _ended(_joined(surfels, found.places @ axes, found.normals @ axes, spacing), len(surfels), spacing)
+    return replace(closed, guessed=doubts_of_guesses(closed))
 
 
 def _unseen_of_object(surfels: Surfels, planes: Sequence[Plane], space: SeenSpace, spacing: float) -> Continued:
@@ -165,7 +163,8 @@ def _ended(surfels: Surfels, seen: int, spacing: float) -> Surfels:
     """The surfels, of which cameras saw the first `seen`, ending where their faces meet others."""
     centers, normals = (part.double().cpu().numpy() for part in (surfels.centers, surfels.normals))
     axes = quaternion_to_axes(surfels.rotations.double()).cpu().numpy()[:, :2]
-    found = ends(centers, normals, axes, Rims.of(surfels), seen, spacing)
+    known = (part.double().cpu().numpy() for part in (surfels.clip_offsets, surfels.clip_angles))
+    found = ends(centers, normals, axes, *known, seen, spacing)
     offsets, angles = torch.from_numpy(found.offsets), torch.from_numpy(found.angles)
     cut = replace(surfels, clip_offsets=offsets.to(surfels.clip_offsets), clip_angles=angles.to(surfels.clip_angles))
     return cut.selected(torch.from_numpy(np.flatnonzero(found.kept)))
