@@ -38,10 +38,10 @@ test-python:  ## every test with another Python and the newest packages, without
 test-slurm: setup  ## sweeps on a Slurm cluster of this machine alone (Debian: apt-get install slurm-wlm munge)
 	$(VENV)/bin/python -m pytest -q -m slurm $(ARGS) tests/slurm
 
-third-party: setup  ## what is exported, read by Mitsuba, USD and the validator of glTF (minutes; npm for the last)
+third-party: setup  ## exports read by Mitsuba, USD and the validator of glTF (npm), and renderers of others (minutes)
 	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-third-party.txt
 	! command -v npm > /dev/null || npm install --silent --no-fund --prefix $(VENV)/npm gltf-validator@2.0.0-dev.3.10
-	$(VENV)/bin/python -m pytest -q tests/light_export $(ARGS)
+	$(VENV)/bin/python -m pytest -q tests/light_export tests/tools/test_foreign_room.py $(ARGS)
 
 crash: setup  ## kills, power cuts, full disks while a tiny scene is made: what the next run ends with (ARGS="CASES SEED")
 	$(VENV)/bin/python tests/crash.py $(ARGS)

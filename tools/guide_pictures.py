@@ -407,6 +407,7 @@ def stages(_: FrozenScene) -> Bytes:
 def settings(_: FrozenScene) -> Bytes:
     """A row of the site's page of settings, and those around it, as a browser shows them."""
     from playwright.sync_api import sync_playwright
+
     from viewer_picture import ARGUMENTS
 
     with TemporaryDirectory() as folder, sync_playwright() as playwright:
