@@ -13,7 +13,9 @@ from rgspipe.evaluation.summary import summary_table
 from rgspipe.evaluation.tables import target_table
 from rgspipe.pages import html as shared
 from rgspipe.pages import report
+from rgspipe.pages.glossary import GLOSSARY
 from rgspipe.pages.provenance import stage_record
+from rgspipe.studies.lights import STATUSES
 
 
 def _empty(fitted) -> report.ReportContents:
@@ -27,6 +29,10 @@ def test_a_report_refers_to_nothing_outside_itself(full_report):
     assert page.pictures and not outside
     assert "link" not in page.tags and "iframe" not in page.tags
     assert not [word for word in ("http:", "https:", "@import", "url(") if word in full_report]
+
+
+def test_words_for_how_fits_end_are_explained() -> None:
+    assert set(STATUSES) <= set(GLOSSARY) and list(GLOSSARY) == sorted(GLOSSARY, key=str.lower)
 
 
 def test_pictures_do_not_wait_to_be_looked_at(full_report):

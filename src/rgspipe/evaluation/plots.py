@@ -19,8 +19,8 @@ from matplotlib.lines import Line2D
 from rgspipe.evaluation import metrics
 from rgspipe.evaluation.classes import class_order
 
-#: Colours that stay apart with colour blindness and in grey; markers say the same once more.
-COLOURS = {"visible": "#0072B2", "out_of_frame": "#E69F00", "occluded": "#6A1B4D", "around_corner": "#2DB58A"}
+#: Colours that stay apart with colour blindness and in grey, and from white by 3 and more; markers say the same again.
+COLOURS = {"visible": "#0072B2", "out_of_frame": "#C58700", "occluded": "#6A1B4D", "around_corner": "#0AA37C"}
 MARKERS = {"visible": "o", "out_of_frame": "s", "occluded": "^", "around_corner": "v"}
 LABELS = {
     "visible": "visible",

@@ -1,24 +1,34 @@
-"""Words of the report that not everybody knows."""
+"""Words of the report that not everybody knows, and how fits end."""
 
 #: In the order of the alphabet.
 GLOSSARY = {
     "95 % region": "The ellipsoid around a recovered light that should hold the true one in 95 of 100 cases.",
     "albedo": "The fraction of light that a surface reflects diffusely, by red, green and blue.",
+    "ambiguous": "Other lights, clearly different, explain the target as well.",
     "around the corner": "A light that reaches what the camera sees only by bouncing off other surfaces.",
+    "at_bound": "An answer at the limit of what lights may be, such as the edge of where they are looked for.",
+    "converged": "The fit ended in a minimum, and nothing clearly different explains the target as well.",
     "fingerprint": "The name of a result: it follows from settings, inputs and code, and changes with any of them.",
     "frozen scene": "Surfels and how light travels between them, computed once; lights are looked for in it.",
     "HDR-FLIP": "How different two pictures look to people at the exposures that they need, 0 to 1; less is better.",
     "held-out view": "A photograph that training did not see, by which the trained scene is judged.",
     "intensity error": "By how much the recovered radiant intensity differs from the true one, mean of the colours.",
     "interreflection": "Light that bounces from surface to surface.",
+    "max_iterations": "The fit was ended while it still improved.",
+    "not_enough_light": "The target is black, or nothing that a lamp could do explains any of it.",
     "occluded": "A light that is inside the picture, behind something.",
     "out of frame": "A light beside the picture; nothing hides it.",
+    "paper_adam": "The method that was published: steps of Adam from a start, for comparison.",
     "position error": "From the recovered to the true place, as a fraction of the scene’s longest side.",
     "PSNR": "How near a picture comes to another, in dB; 20 dB more is a tenth of the error. More is better.",
+    "ruled out": "Lights that the fit tried beside its answer, and that explain the target clearly worse.",
+    "search_lm": "The method of this program: a search for where lights may be, then Levenberg-Marquardt steps.",
     "solved": "A target with the right number of lights, each within the limit that the head of this page names.",
     "SSIM": "How alike the structure of two pictures is, up to 1; more is better.",
     "stated error": "The position error that the fit itself expects, from noise and from what it does not know.",
     "surfel": "A small disc of surface with place, direction, size and albedo; the scene is made of them.",
     "target": "A picture, or several of the same moment, in which lights are to be found.",
+    "undetermined": "The best that was found, but the target leaves a place or a size of it open.",
+    "unexplained": "Too much of the target’s light is left over: a wrong number or kind of light, or another scene.",
     "W/sr": "Watt per steradian: the power that a lamp sends into a direction; × 4π that of a lamp that shines evenly.",
 }

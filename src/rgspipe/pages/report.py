@@ -21,7 +21,7 @@ from rgspipe.pages.light_studies import LightStudy, light_studies
 from rgspipe.pages.provenance import StageRecord
 from rgspipe.pages.quality import compared_lights, quality_columns, quality_rows
 from rgspipe.pages.relit import Relighting, relightings
-from rgspipe.pages.room_view import Alternatives, room_view
+from rgspipe.pages.room_view import Alternatives, LampMark, room_view
 from rgspipe.pages.section import Section, shown_sections
 from rgspipe.percent import percent
 from rgspipe.scene import Surfels
@@ -71,6 +71,7 @@ class ReportContents:
         comparison: PNG of truth, render and difference of held-out views, or None.
         gallery: pictures of the dataset, or None.
         captured: the lamps that were found in photographs under unknown lamps, where the scene is made of such.
+        captured_lamps: these in the drawing of the room.
         study: rows of `study_row` of this scene: what bad captures cost; None if no study has been made.
         study_remark: what the reader must know of that study, or "".
         light_studies: studies of recovered lights that have been made, with the rows of this scene.
@@ -102,6 +103,7 @@ class ReportContents:
     comparison: bytes | None = None
     gallery: Gallery | None = None
     captured: Sequence[Section] = ()
+    captured_lamps: Sequence[LampMark] = ()
     study: pd.DataFrame | None = None
     study_remark: str = ""
     light_studies: Sequence[LightStudy] = ()
@@ -156,7 +158,9 @@ def render_report(contents: ReportContents) -> str:
 def _room(contents: ReportContents) -> dict[str, Any] | None:
     if contents.surfels is None:
         return None
-    return room_view(contents.surfels, contents.targets, contents.cameras, contents.alternatives)
+    return room_view(
+        contents.surfels, contents.targets, contents.cameras, contents.alternatives, contents.captured_lamps
+    )
 
 
 def _goals(contents: ReportContents, psnr: float | None, method: str) -> list[goals.Goal]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,7 +15,7 @@ import pandas as pd
 from rgspipe.datasets.alternatives_file import ToldAlternative
 from rgspipe.evaluation import calibration
 from rgspipe.evaluation.light_plot import CameraMark, nearer
-from rgspipe.evaluation.plots import colour_of
+from rgspipe.evaluation.plots import OTHER_COLOUR, colour_of
 from rgspipe.evaluation.tables import VARIANCES
 from rgspipe.pages.html import label
 from rgspipe.percent import percent
@@ -37,13 +38,35 @@ Alternatives: TypeAlias = Mapping[tuple[str, int, str], Sequence[ToldAlternative
 STEPS = 65535
 
 
+@dataclass(frozen=True)
+class LampMark:
+    """A lamp that was on in the photographs of a capture.
+
+    Attributes:
+        name: "lamp 1".
+        place: (3,) scene units.
+        covariance: (3, 3) of the place, or None.
+        told: what is known of the place, in words.
+    """
+
+    name: str
+    place: npt.NDArray
+    covariance: npt.NDArray | None
+    told: str
+
+
 def room_view(
-    surfels: Surfels, targets: pd.DataFrame, cameras: Sequence[CameraMark], alternatives: Alternatives | None = None
+    surfels: Surfels,
+    targets: pd.DataFrame,
+    cameras: Sequence[CameraMark],
+    alternatives: Alternatives | None = None,
+    captured: Sequence[LampMark] = (),
 ) -> dict[str, Any]:
     """Surfels, cameras and, by method and number of views, lights with their regions, as JSON has them.
 
     Args:
         targets: rows of `target_table`.
+        captured: lamps that were on in the photographs which the scene was made from.
     """
     others = alternatives or {}
     centers = surfels.centers.double().numpy()
@@ -54,6 +77,7 @@ def room_view(
         "high": high.tolist(),
         "surfels": _surfels(surfels, low, size),
         "cameras": [vars(nearer(mark, low, high)) for mark in cameras],
+        "captured": [_captured(mark, size) for mark in captured],
         "groups": [
             {
                 "method": method,
@@ -104,6 +128,19 @@ def _light(row: Mapping[str, Any], size: float) -> dict[str, Any]:
     }
 
 
+def _captured(mark: LampMark, size: float) -> dict[str, Any]:
+    return {
+        "target": mark.name,
+        "class": "captured",
+        "label": "on in the photographs",
+        "colour": OTHER_COLOUR,
+        "found": mark.place.tolist(),
+        "truth": None,
+        "region": None if mark.covariance is None else _axes(mark.covariance, size),
+        "told": mark.told,
+    }
+
+
 def _other(one: ToldAlternative) -> dict[str, Any]:
     places = [light.position.tolist() for light in one.lights if not light.distant]
     return {"places": places, "told": one.told, "ruled_out": one.ruled_out}
@@ -120,5 +157,9 @@ def _region(row: Mapping[str, Any], size: float) -> list[list[float]] | None:
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if np.isnan(matrix).any():
         return None
+    return _axes(matrix, size)
+
+
+def _axes(matrix: npt.NDArray, size: float) -> list[list[float]]:
     lengths, axes = calibration.half_axes(matrix, LONGEST * size)
     return (axes * lengths).T.tolist()

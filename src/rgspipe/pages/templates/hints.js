@@ -5,3 +5,10 @@ for (const box of document.querySelectorAll(".wide, .strip, .drawn")) {
   new ResizeObserver(tell).observe(box);
   box.querySelectorAll("img").forEach((picture) => picture.addEventListener("load", tell));
 }
+// Paper cannot be opened: what is folded is printed, and folded again.
+let folded = [];
+addEventListener("beforeprint", () => {
+  folded = [...document.querySelectorAll("details:not([open])")];
+  folded.forEach((one) => { one.open = true; });
+});
+addEventListener("afterprint", () => folded.forEach((one) => { one.open = false; }));

@@ -88,7 +88,7 @@ for (const box of document.querySelectorAll(".room")) {
     if (!found) return;
     shape(pen, light.class, found, 5.5 * scale);
     pen.fillStyle = tint; pen.fill(); pen.strokeStyle = page; pen.lineWidth = 1.5 * scale; pen.stroke();
-    spots.push({ x: found[0] / scale, y: found[1] / scale, light });
+    spots.push({ x: found[0] / scale, y: found[1] / scale, light, told: light.told });
   };
 
   // What a fit weighed against its answer.
@@ -111,6 +111,7 @@ for (const box of document.querySelectorAll(".room")) {
     surfels(pen, at);
     pen.lineWidth = 1.2 * scale;
     for (const one of data.cameras) camera(pen, at, one);
+    for (const light of data.captured) lamp(pen, at, light);
     for (const light of lamps()) if (!target.value || light.target === target.value) {
       if (target.value && shown("others")) for (const one of light.others) other(pen, at, light, one);
       lamp(pen, at, light);

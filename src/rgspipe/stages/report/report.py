@@ -22,7 +22,7 @@ from rgspipe.pages.provenance import StageRecord, stage_record
 from rgspipe.scene import Surfels
 from rgspipe.scene.grade import SceneGrade
 from rgspipe.stages.base import Need, Stage, StageContext
-from rgspipe.stages.report.captured import captured_lamps, captured_section
+from rgspipe.stages.report.captured import captured_lamps, captured_marks, captured_section
 from rgspipe.stages.report.gallery import dataset_gallery
 from rgspipe.stages.report.relit import found_relightings, relight_files
 from rgspipe.stages.report.sections import found_galleries, found_sections, section_files
@@ -85,6 +85,7 @@ def _contents(context: StageContext) -> report.ReportContents:
         comparison=_optional_bytes(judged[0] if judged else trained, "comparison.png"),
         gallery=dataset_gallery(context.inputs.get("generate_dataset"), surfels, targets, captured_lamps(trained)),
         captured=captured_section(trained),
+        captured_lamps=captured_marks(trained),
         study=study,
         study_remark=remark,
         light_studies=found_light_studies(config, context.inputs.get("freeze")),
