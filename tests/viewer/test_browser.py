@@ -207,6 +207,11 @@ def test_keys_do_what_buttons_do(window, page: Page) -> None:
     until(lambda: session.section is None)
     window.keyboard.press("u")
     until(lambda: session.exposure == 0.5)
+    window.keyboard.press("Shift+U")
+    until(lambda: not session.is_open_to_it)
+    assert session.exposure == 0.5
+    window.keyboard.press("Shift+U")
+    until(lambda: session.is_open_to_it)
     for digit, node in enumerate(page.drawings.kinds.values(), start=1):
         window.keyboard.press(str(digit))
         until(lambda node=node: not node.visible)

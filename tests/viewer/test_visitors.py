@@ -5,22 +5,22 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
-import msgspec
 import pytest
 
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera
 from rgspipe.viewer.serve import Viewer, view
 
-viser = pytest.importorskip("viser")
+pytest.importorskip("viser")
 
-import zstandard  # noqa: E402  # viser brings both
-from websockets.sync.client import ClientConnection, connect  # noqa: E402
+import zstandard  # viser brings both
+from websockets.sync.client import ClientConnection
 
-from rgspipe.viewer.page import Page  # noqa: E402
+from rgspipe.viewer.page import Page
+from viewer.visiting import message, visitor, wait_for
 
 NAN = float("nan")
 
@@ -49,18 +49,6 @@ def viewer(frozen: FrozenScene) -> Iterator[Viewer]:
     made.stop()
 
 
-def visitor(viewer: Viewer, agent: str = "test") -> ClientConnection:
-    kind = f"viser-v{viser.__version__}"
-    return connect(viewer.url.replace("http", "ws"), subprotocols=[kind], max_size=None, user_agent_header=agent)
-
-
-def message(**other: Any) -> bytes:
-    """What a browser tells of its camera, but for what is other."""
-    usual = {"wxyz": [0.707, -0.707, 0.0, 0.0], "position": [0.0, -1.5, 0.0], "fov": 0.8, "near": 0.01, "far": 100.0}
-    usual |= {"look_at": [0.0, 0.0, 0.0], "up_direction": [0.0, 0.0, 1.0], "image_height": 300, "image_width": 400}
-    return msgspec.msgpack.encode({"type": "ViewerCameraMessage", **usual, **other})
-
-
 def words(frame: bytes) -> bytes:
     """What viser sends, without its arrays: after two lengths of 8 bytes, the second of them the compressed one."""
     return zstandard.ZstdDecompressor().decompress(frame[16 : 16 + int.from_bytes(frame[8:16], "little")])
@@ -72,14 +60,6 @@ def wait_until_told(browser: ClientConnection, *kinds: bytes) -> None:
     while awaited:
         told = words(browser.recv(timeout=60.0))
         awaited = {one for one in awaited if one not in told}
-
-
-def wait_for(what: Callable[[], object]) -> None:
-    """On a busy machine, too."""
-    end = time.monotonic() + 60.0
-    while not what():
-        assert time.monotonic() < end, "it did not come"
-        time.sleep(0.01)
 
 
 def threads() -> list[str]:

@@ -22,7 +22,7 @@ class Action:
     """Something that a visitor can do.
 
     Attributes:
-        key: a letter; W, A, S, D, Q and E fly.
+        key: a letter, or shift+ and a letter; W, A, S, D, Q and E fly.
         help: a sentence.
     """
 
@@ -57,7 +57,10 @@ class Actions:
     def keys(self, *actions: Action) -> None:
         """A key for each; all are in the list that Ctrl-K opens."""
         for action in actions:
-            command = self._client.gui.add_command(action.name, description=action.help, hotkey=action.key)
+            modifier, _, key = action.key.rpartition("+")
+            command = self._client.gui.add_command(
+                action.name, description=action.help, hotkey=key, modifier=modifier or None
+            )
             command.on_trigger(self._asked(action))
 
     def field(self, field: Any, run: Callable[[], None]) -> None:

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from rgspipe.errors import InputError
 from rgspipe.fitting import FitResult
 from rgspipe.fitting.words import told_costs
 from rgspipe.progress import progress_told
+from rgspipe.scene import Camera
 from rgspipe.viewer.actions import Action
 from rgspipe.viewer.around import cameras_around
 from rgspipe.viewer.drawings import Drawings
@@ -43,6 +45,7 @@ class FitControls:
         self._visit, self._session, self._drawings, self._lamps_changed = visit, visit.session, drawings, lamps_changed
         self._cases = {case.name: case for case in visit.exhibit.cases}
         self.searching, self._compared = False, -1
+        self._advised: Camera | None = None
         actions, gui = visit.actions, visit.client.gui
         find = Action(
             "find it from the photographs",
@@ -58,13 +61,17 @@ class FitControls:
                 "target", [*self._cases] or ["none"], hint="Photographs under lamps that are looked for. Key O."
             )
             self._case.visible = len(self._cases) > 1
-            self._view = gui.add_dropdown("look from", [_FREE], hint="The camera of a photograph. Key G.")
+            self._view = gui.add_dropdown(
+                "look from", [_FREE], hint="The camera of a photograph. Keys G, Shift-G (free)."
+            )
             self._buttons += actions.offer(*self._offered())
             self._step = gui.add_slider("step", 0, 1, 1, 1, hint="Lamps on the way of the search. Keys 8, 9.")
         for field, changed in ((self._case, self._open), (self._view, self._look), (self._step, self._go_back)):
             actions.field(field, changed)
         actions.keys(
             Action("next camera", "G", "Look through the camera of the next photograph.", self._next_view),
+            Action("free view", "shift+G", "Stay where you are, with no photograph beside the picture.", self._let_go),
+            Action("yellow camera", "shift+V", "Look through the camera that would tell most.", self._look_advised),
             Action("next target", "O", "Photographs of the next target.", self._next_case),
             Action("step back", "8", "The lamps one step earlier on the way of the search.", lambda: self._walk(-1)),
             Action("step on", "9", "The lamps one step later.", lambda: self._walk(1)),
@@ -168,13 +175,20 @@ class FitControls:
         def advised(ended: Future) -> None:
             advice = self._result(ended)
             answer = advice.words([name for name, _ in named])
-            self._told.content = f"{answer} Click the yellow camera to look through it."
-            self._drawings.advised(named[advice.ranked[0].camera][1] if advice.ranked else None)
+            self._told.content = f"{answer} Click the yellow camera, or press **Shift-V**, to look through it."
+            self._advised = named[advice.ranked[0].camera][1] if advice.ranked else None
+            self._drawings.advised(self._advised)
 
         def advice() -> Any:
             return self._telling(words, lambda: finder.advice(taken, lights, cameras, WANTED))
 
         self._visit.actions.beside("which view next?", advice, advised)
+
+    def _look_advised(self) -> None:
+        if self._advised is None:
+            remedy = "Ask “which view next?” first: key V."
+            raise InputError("yellow camera", expected="one that was advised", found="none", remedy=remedy)
+        self._visit.go_to(self._advised)
 
     def _compare(self) -> None:
         if self._photographs:
@@ -193,6 +207,12 @@ class FitControls:
             index = names.index(self._view.value)
             self._visit.go_to(self._photographs[index].camera)
             self._show(index)
+        else:
+            self._strip.visible = False
+
+    def _let_go(self) -> None:
+        self._view.value = _FREE
+        self._look()
 
     def _next_view(self) -> None:
         if options := self._view.options[1:]:

@@ -19,6 +19,8 @@ SHIFT = 0.05
 #: Sections that are offered: across which axis.
 SECTIONS = ("none", "across x", "across y", "across z")
 
+_AROUND = "What comes through openings, beside the lamps."
+
 
 class PictureControls:
     """Fields of the picture."""
@@ -39,9 +41,7 @@ class PictureControls:
             "section at", 0.0, 1.0, 0.01, 0.5, hint="From the lower to the upper end. Keys 6, 7."
         )
         self._place.visible = False
-        self._around = gui.add_checkbox(
-            "light from all around", True, hint="What comes through openings, beside the lamps.", visible=False
-        )
+        self._around = gui.add_checkbox("light from all around", True, hint=f"{_AROUND} Key Shift-U.", visible=False)
         self._scale = gui.add_image(scale(), visible=False)
         self._legend = gui.add_markdown("")
         self._dark = gui.add_checkbox("dark page", True, hint="Of the page around the picture. Key 0.")
@@ -51,6 +51,7 @@ class PictureControls:
         actions = (
             Action("brighter", "U", "Half a stop brighter.", lambda: self._expose(STOPS)),
             Action("darker", "J", "Half a stop darker.", lambda: self._expose(-STOPS)),
+            Action("light from all around", "shift+U", _AROUND, self._turn_around),
             Action("next way to show", "I", "Picture, irradiance, illuminance in turn.", self._show_next),
             Action("next section", "L", "No section, then one across each axis.", self._cut_next),
             Action("section down", "6", "Move the section towards the lower end.", lambda: self._shift(-SHIFT)),
@@ -68,6 +69,10 @@ class PictureControls:
 
     def _expose(self, stops: float) -> None:
         self._exposure.value = float(np.clip(self._exposure.value + stops, -MOST_STOPS, MOST_STOPS))
+        self._read()
+
+    def _turn_around(self) -> None:
+        self._around.value = not self._around.value
         self._read()
 
     def _show_next(self) -> None:
