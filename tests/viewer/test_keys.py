@@ -21,7 +21,7 @@ pytest.importorskip("viser")
 from websockets.sync.client import ClientConnection
 
 from rgspipe.viewer.page import Page
-from viewer.visiting import keys_of, message, press, visitor, wait_for
+from viewer.visiting import keys_of, press, visited, wait_for
 
 GUIDE = Path(__file__).parents[2] / "docs" / "guides" / "view.md"
 LAMP = PointLight(list(VISIBLE), 0.5)
@@ -36,19 +36,14 @@ def viewer(frozen: FrozenScene) -> Iterator[Viewer]:
 
 
 @pytest.fixture
-def browser(viewer: Viewer) -> Iterator[ClientConnection]:
-    with visitor(viewer) as browser:
-        browser.send(message())
-        wait_for(lambda: viewer.pages)
-        yield browser
-    wait_for(lambda: not viewer.pages)
+def both(viewer: Viewer) -> Iterator[tuple[Page, ClientConnection]]:
+    with visited(viewer) as both:
+        yield both
 
 
 @pytest.fixture
-def page(viewer: Viewer, browser: ClientConnection) -> Page:
-    [page] = viewer.pages.values()
-    wait_for(lambda: page._begun is not None and page._wanted is None)
-    return page
+def page(both: tuple[Page, ClientConnection]) -> Page:
+    return both[0]
 
 
 def named(words: str) -> list[str]:
@@ -66,8 +61,8 @@ def test_every_control_has_a_key_and_says_so(page: Page) -> None:
     assert len(controls) > 30
     for control in controls.values():
         sentence = (control.hint or "").rpartition("Key")[2]
-        assert {*named(sentence)} & keys.keys(), f"{control.label}: {control.hint}"
-        assert {*named(sentence)} <= keys.keys(), f"{control.label}: {control.hint}"
+        its = {*named(sentence)}
+        assert its and its <= keys.keys(), f"{control.label}: {control.hint}"
     assert all(one.description for one in keys.values())
 
 
@@ -79,8 +74,9 @@ def test_the_guide_s_table_has_every_key(page: Page) -> None:
 
 
 def test_keys_leave_the_photographs_and_reach_the_camera_that_was_advised(
-    page: Page, browser: ClientConnection
+    both: tuple[Page, ClientConnection],
 ) -> None:
+    page, browser = both
     first, second = (one.camera for one in page.session.case.photographs)
     went = []
     page.fit._visit = replace(page.fit._visit, go_to=went.append)
@@ -96,7 +92,8 @@ def test_keys_leave_the_photographs_and_reach_the_camera_that_was_advised(
     assert went[2:] == [page.fit._advised] and page.fit._view.value == "free"
 
 
-def test_a_key_leaves_light_from_all_around_out(page: Page, browser: ClientConnection) -> None:
+def test_a_key_leaves_light_from_all_around_out(both: tuple[Page, ClientConnection]) -> None:
+    page, browser = both
     for is_open in (False, True):
         press(page, browser, "shift-u")
         assert page.session.is_open_to_it is is_open and page.picture._around.value is is_open

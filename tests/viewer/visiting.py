@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import msgspec
@@ -25,6 +26,18 @@ def message(**other: Any) -> bytes:
     usual = {"wxyz": [0.707, -0.707, 0.0, 0.0], "position": [0.0, -1.5, 0.0], "fov": 0.8, "near": 0.01, "far": 100.0}
     usual |= {"look_at": [0.0, 0.0, 0.0], "up_direction": [0.0, 0.0, 1.0], "image_height": 300, "image_width": 400}
     return msgspec.msgpack.encode({"type": "ViewerCameraMessage", **usual, **other})
+
+
+@contextmanager
+def visited(viewer: Viewer) -> Iterator[tuple[Page, ClientConnection]]:
+    """The page of one visitor, furnished and gone to its first place, and what a browser has of it."""
+    with visitor(viewer) as browser:
+        browser.send(message())
+        wait_for(lambda: viewer.pages)
+        [page] = viewer.pages.values()
+        wait_for(lambda: page._begun is not None and page._wanted is None)
+        yield page, browser
+    wait_for(lambda: not viewer.pages)
 
 
 def press(page: Page, browser: ClientConnection, key: str) -> None:

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 import viser
 
 from rgspipe.datasets.alternatives_file import ToldAlternative
+from rgspipe.relighting.sweeps import spread_frames
 from rgspipe.scene import Camera, LightRig
 from rgspipe.viewer.cameras import pose_of
 from rgspipe.viewer.ellipsoids import region
 from rgspipe.viewer.material import Found, Photograph
 
-#: Length of a camera's frustum, and radius of the balls of true lamps and of alternatives, of the scene's size.
-FRUSTUM, TRUTH, OTHER = 0.06, 0.015, 0.009
+#: Lengths of the frustums of cameras whose photographs are searched and of others, and radii of the balls of true lamps
+#: and of alternatives, of the scene's size.
+FRUSTUM, FURTHER, TRUTH, OTHER = 0.06, 0.035, 0.015, 0.009
+
+#: At most so many of the others are drawn: more hide the scene.
+MOST_FURTHER = 40
 
 #: What can be hidden together: by the name of its node a label and a line of help.
 KINDS = {
@@ -22,10 +28,14 @@ KINDS = {
     "others": ("alternatives", "Lamps that the search ruled out (grey) or could not (red); their numbers are listed."),
     "way": ("way of search", "From its start to the lamps that were found, in blue."),
     "truth": ("true lamps", "True places of the lamps where they are known, in green."),
-    "cameras": ("cameras", "Of the photographs."),
+    "cameras": (
+        "cameras",
+        "Of photographs that are searched (white) and of others (violet); a click looks through one.",
+    ),
 }
 
-_FOUND, _TRUE, _WAY, _TAKEN, _ADVISED = (255, 140, 0), (0, 160, 80), (90, 170, 255), (230, 230, 230), (255, 220, 60)
+_FOUND, _TRUE, _WAY = (255, 140, 0), (0, 160, 80), (90, 170, 255)
+_TAKEN, _FURTHER, _ADVISED = (230, 230, 230), (180, 130, 230), (255, 220, 60)
 _RULED_OUT, _OPEN = (150, 150, 160), (220, 60, 60)
 
 
@@ -35,7 +45,7 @@ class Drawings:
     Args:
         scene: the visitor's.
         size: of the frozen scene.
-        go_to: is called with a camera whose frustum is clicked.
+        go_to: is called with the camera that would tell most, where its frustum is clicked.
 
     Attributes:
         kinds: a node for each of KINDS, with what is of it below; hidden, it hides that.
@@ -64,17 +74,26 @@ class Drawings:
                 place = tuple(light.position.tolist())
                 self._lamps.append(scene.add_icosphere(f"/truth/{index}", TRUTH * size, _TRUE, position=place))
 
-    def cameras(self, photographs: Sequence[Photograph]) -> None:
-        """A frustum for each photograph."""
+    def cameras(
+        self, searched: Sequence[Photograph], others: Sequence[Photograph], look: Callable[[Photograph], None]
+    ) -> None:
+        """A frustum for each photograph that is searched, and a smaller one for some of the others.
+
+        Args:
+            look: is called with the photograph whose frustum is clicked.
+        """
         _clear(self._frusta)
-        self._frusta += [self._frustum(f"/cameras/{k}", one.camera, _TAKEN) for k, one in enumerate(photographs)]
+        some = [others[index] for index in spread_frames(len(others), MOST_FURTHER)]
+        styles = [(one, _TAKEN, FRUSTUM) for one in searched] + [(one, _FURTHER, FURTHER) for one in some]
+        for index, (one, colour, length) in enumerate(styles):
+            self._frusta.append(self._frustum(f"/cameras/{index}", one.camera, colour, partial(look, one), length))
         self._hide()
 
     def advised(self, camera: Camera | None) -> None:
         """The camera that would tell most."""
         _clear(self._advised)
         if camera is not None:
-            self._advised.append(self._frustum("/cameras/advised", camera, _ADVISED))
+            self._advised.append(self._frustum("/cameras/advised", camera, _ADVISED, partial(self._go_to, camera)))
 
     def seen_from(self, camera: Camera) -> None:
         """The visitor looks through another camera, whose own frustum is hidden."""
@@ -84,7 +103,7 @@ class Drawings:
     def _hide(self) -> None:
         for frustum in (*self._frusta, *self._advised) if self._eye is not None else ():
             away = float(np.linalg.norm(frustum.position - self._eye.origin.numpy()))
-            frustum.visible = away > FRUSTUM * self._size
+            frustum.visible = away > frustum.scale
 
     def _other(self, number: int, other: ToldAlternative) -> list:
         """Balls at the lamps of an alternative, and the number under which it is told."""
@@ -101,20 +120,27 @@ class Drawings:
         pairs = np.stack([way[:-1], way[1:]], axis=1)
         return self._scene.add_line_segments(f"/way/{index}", pairs, _WAY, thickness=2.0, thickness_units="screen")
 
-    def _frustum(self, name: str, camera: Camera, colour: tuple[int, int, int]) -> viser.CameraFrustumHandle:
+    def _frustum(
+        self,
+        name: str,
+        camera: Camera,
+        colour: tuple[int, int, int],
+        clicked: Callable[[], None],
+        length: float = FRUSTUM,
+    ) -> viser.CameraFrustumHandle:
         position, wxyz, fov = pose_of(camera)
         frustum = self._scene.add_camera_frustum(
             name,
             fov,
             camera.width / camera.height,
-            scale=FRUSTUM * self._size,
+            scale=length * self._size,
             thickness=2.0,
             thickness_units="screen",
             color=colour,
             wxyz=wxyz,
             position=position,
         )
-        frustum.on_click(lambda _: self._go_to(camera))
+        frustum.on_click(lambda _: clicked())
         return frustum
 
 

@@ -82,7 +82,8 @@ class FitControls:
         """Show the session's photographs, and what was found in them."""
         case, found = self._session.case, self._session.found
         self._view.options = [_FREE, *(one.name for one in self._photographs)]
-        self._drawings.cameras(case.photographs)
+        others = self._photographs[len(case.photographs) :]
+        self._drawings.cameras(case.photographs, others, self._clicked)
         self._drawings.lamps(found, case.truth)
         last = 0 if found is None else len(found.path) - 1
         self._step.visible = last > 0
@@ -210,15 +211,20 @@ class FitControls:
         else:
             self._strip.visible = False
 
-    def _let_go(self) -> None:
-        self._view.value = _FREE
+    def _clicked(self, photograph: Photograph) -> None:
+        self._visit.actions.do("look from", partial(self._look_from, photograph.name))
+
+    def _look_from(self, name: str) -> None:
+        self._view.value = name
         self._look()
+
+    def _let_go(self) -> None:
+        self._look_from(_FREE)
 
     def _next_view(self) -> None:
         if options := self._view.options[1:]:
             place = options.index(self._view.value) + 1 if self._view.value in options else 0
-            self._view.value = options[place % len(options)]
-            self._look()
+            self._look_from(options[place % len(options)])
 
     def _open(self) -> None:
         self._session.open(self._cases[self._case.value])
