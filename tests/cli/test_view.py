@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import torch
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.view import DEMO, KEYS, PAGE_KEYS, Asked, parsed, serve, view_folder
 from rgspipe.datasets.light_file import write_lights
+from rgspipe.datasets.location import point_at_dataset
 from rgspipe.errors import InputError
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
@@ -103,6 +105,35 @@ def test_lamps_are_exported_to_where_they_are_in_the_scene_s_own_file(
     monkeypatch.setattr("rgspipe.viewer.serve.view", lambda *_, **words: given.update(words) or Served())
     assert view_folder([str(folder), "browser=false"]) == 0
     assert given["world"] == World(1.0, 0.25, (1.0, 2.0, -3.0))
+
+
+def frozen_from(dataset: Path, outputs: Path) -> Path:
+    """The folder of a frozen scene that was made from a dataset."""
+    for stage, inputs in (("generate_dataset", {}), ("freeze", {"generate_dataset": ["aa"]})):
+        folder = outputs / "room" / stage / "aa"
+        folder.mkdir(parents=True)
+        told = {"schema": 1, "stage": stage, "fingerprint": "aa", "inputs": inputs, "files": {}, "facts": {}}
+        (folder / "manifest.json").write_text(json.dumps(told))
+    point_at_dataset(folder.parents[1] / "generate_dataset" / "aa", dataset)
+    return folder
+
+
+def test_cameras_of_the_dataset_are_offered_held_out_ones_first(
+    dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, given = frozen_from(dataset, tmp_path / "outputs"), {}
+    monkeypatch.setattr(FrozenScene, "load", lambda folder: FrozenScene.freeze(closed_box(0.5).to(torch.float32)))
+    monkeypatch.setattr("rgspipe.viewer.serve.view", lambda *_, **words: given.update(words) or Served())
+    assert view_folder([str(folder), "browser=false"]) == 0
+    assert [one.name for one in given["references"]] == ["test/r_0000", "train/r_0000"]
+    assert "cameras" not in capsys.readouterr().out
+    monkeypatch.setattr("rgspipe.cli.view_references.MOST_OFFERED", 1)
+    assert view_folder([str(folder), "browser=false"]) == 0
+    assert [one.name for one in given["references"]] == ["test/r_0000"]
+    assert "1 of the dataset's 2 cameras are offered" in capsys.readouterr().out
+    shutil.rmtree(dataset)  # the scene is shown all the same
+    assert view_folder([str(folder), "browser=false"]) == 0
+    assert given["references"] == [] and "cameras are not offered" in capsys.readouterr().out
 
 
 def test_lamps_of_another_scene_are_told(

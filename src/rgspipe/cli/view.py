@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rgspipe.cli.browser import open_page
+from rgspipe.cli.view_references import references
 from rgspipe.errors import InputError
 from rgspipe.machine.device import CHOICES, Wanted
 from rgspipe.renderer.device import chosen_device
@@ -81,14 +82,16 @@ def view_folder(arguments: Sequence[str]) -> int:
     if asked.lights is not None and (ambient := read_ambient(asked.lights)) is not None:
         unknowns["ambient"] = ambient
     case = Case(found=found) if asked.target is None else case_in(asked.target, found, found_capture)
+    info = origin_of(asked.folder / SURFELS)
     viewer = view(
         FrozenScene.load(asked.folder).to(device),
         None if asked.lights is None else read_lights(asked.lights),
         cases=[case],
+        references=references(None if info is None else info.parent),
         port=asked.port,
         resolution=asked.resolution,
         address=asked.address,
-        world=world_of(1.0, origin_of(asked.folder / SURFELS)),
+        world=world_of(1.0, info),
         **unknowns,
     )
     return serve(viewer, asked.port, asked.browser)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rgspipe.cli.compose import compose_config
 from rgspipe.cli.jobs import run_jobs
 from rgspipe.cli.view import serve
+from rgspipe.cli.view_references import references
 from rgspipe.config import RgspipeConfig
 from rgspipe.errors import InputError
 from rgspipe.graph.resolver import StageLoader, resolve
@@ -77,7 +78,7 @@ def _serve(made: _Made) -> int:
     viewer = view(
         FrozenScene.load(freeze.folder()).to(chosen_device(config.device)),
         cases=[*_cases(made, config), *captured(made.find, config)],
-        references=_references(dataset),
+        references=references(None if dataset is None else dataset.folder()),
         port=page.port,
         resolution=page.resolution,
         address=page.address,
@@ -134,15 +135,3 @@ def _case(target: Target, config: RgspipeConfig, truth: LightRig, found: Found |
     taken = [replace(one, name=every[index].name) for one, index in zip(case.photographs, used, strict=False)]
     others = [one for one in every if one.name not in {own.name for own in taken}]
     return replace(case, photographs=taken, others=others)
-
-
-def _references(dataset: Artifact | None) -> list:
-    """The held-out views of the dataset, or those of training where none is held out."""
-    from rgspipe.datasets.location import open_dataset
-    from rgspipe.viewer.material import Photograph
-
-    if dataset is None:
-        return []
-    views = open_dataset(dataset.folder(), train=False, targets=False).test
-    views = views or open_dataset(dataset.folder(), test=False, targets=False).train
-    return [Photograph.of(view, view.name) for view in views]

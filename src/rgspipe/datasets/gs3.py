@@ -61,9 +61,27 @@ def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, 
     Raises:
         InputError: a file is missing, broken or inconsistent, or images under known lights state other exposures.
     """
+    return load_entries(split_entries(root, split), root, split, info)
+
+
+def split_entries(root: Path, split: str) -> list[FrameEntry]:
+    """The frames of transforms_<split>.json, whose images are still to be read.
+
+    Raises:
+        InputError: the file is missing, broken or inconsistent.
+    """
     what = f"the cameras and lights of the {split} views, laid out as docs/guides/your_own_scene.md says"
     entries = read_entries(root / f"transforms_{split}.json", what)
     check_once([entry.image_path for entry in entries], entries[0].transforms_path)
+    return entries
+
+
+def load_entries(entries: list[FrameEntry], root: Path, split: str, info: DatasetInfo | None) -> tuple[View, ...]:
+    """The views of all or some of the frames of transforms_<split>.json, as `load_split` has them.
+
+    Raises:
+        InputError: a file is missing, broken or inconsistent, or images under known lights state other exposures.
+    """
     lit = any(entry.names_light for entry in entries)
     reading = progress_bar(entries, f"reading {split} views", unit="view")
     views = [_load_view(entry, root, info, light=lit, depth=True) for entry in reading]

@@ -103,7 +103,7 @@ class Drawings:
     def _hide(self) -> None:
         for frustum in (*self._frusta, *self._advised) if self._eye is not None else ():
             away = float(np.linalg.norm(frustum.position - self._eye.origin.numpy()))
-            frustum.visible = away > frustum.scale
+            frustum.visible = away > FRUSTUM * self._size
 
     def _other(self, number: int, other: ToldAlternative) -> list:
         """Balls at the lamps of an alternative, and the number under which it is told."""
