@@ -130,7 +130,7 @@ def test_cameras_of_the_dataset_are_offered_held_out_ones_first(
     monkeypatch.setattr("rgspipe.cli.view_references.MOST_OFFERED", 1)
     assert view_folder([str(folder), "browser=false"]) == 0
     assert [one.name for one in given["references"]] == ["test/r_0000"]
-    assert "1 of the dataset's 2 cameras are offered" in capsys.readouterr().out
+    assert "1 of the dataset's 2 cameras are offered, held-out ones first; 1 are left out." in capsys.readouterr().out
     shutil.rmtree(dataset)  # the scene is shown all the same
     assert view_folder([str(folder), "browser=false"]) == 0
     assert given["references"] == [] and "cameras are not offered" in capsys.readouterr().out

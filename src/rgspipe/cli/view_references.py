@@ -29,8 +29,7 @@ def references(dataset: Path | None) -> list[Photograph]:
     except InputError as error:
         print(f"The dataset's cameras are not offered. {error}")
         return []
-    if count > len(views):
-        print(
-            f"{len(views)} of the dataset's {count} cameras are offered, held-out ones first; the others are left out."
-        )
+    if left_out := count - len(views):
+        offered = f"{len(views)} of the dataset's {count} cameras are offered, held-out ones first"
+        print(f"{offered}; {left_out} are left out.")
     return [Photograph.of(view, view.name) for view in views]
