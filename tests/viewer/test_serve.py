@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+import torch
 
+import rgspipe as rg
+from lit_room import VISIBLE, room_cameras
 from rgspipe.errors import InputError
+from rgspipe.fitting.result import dark_result
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.viewer.serve import Viewer, view
 
@@ -67,6 +73,58 @@ def test_who_has_the_token_may_come_from_elsewhere(frozen: FrozenScene) -> None:
         assert answer(open_to_all.rsplit("/", 2)[0] + "/wrong/", None) == 403
     finally:
         viewer.stop()
+
+
+def test_a_fit_is_shown_beside_its_images(frozen: FrozenScene) -> None:
+    cameras, lamp = room_cameras(24), rg.PointLight(list(VISIBLE), 0.5)
+    images = [frozen.render(camera, lamp) for camera in cameras]
+    result = rg.fit_lights(frozen, cameras, images)
+    shown = rg.view(frozen, fit=result, cameras=cameras, images=[image.numpy() for image in images], port=0)
+    shown.stop()
+    session, finder = shown._exhibit.session(), shown._exhibit.finder
+    assert session.lights == result.lights == session.found.lights
+    assert session.found.covariance == result.covariance and len(session.found.path) == len(result.trajectory)
+    assert [one.camera for one in session.case.photographs] == cameras
+    assert shown._exhibit.camera is cameras[0]
+    for one, image in zip(session.case.photographs, images, strict=True):
+        assert torch.equal(one.image, image)
+    again = finder.refit(session.case.photographs, session.lights)
+    assert float((again.lights[0].position - lamp.position).norm()) < 1e-2
+
+
+def test_images_are_shown_whose_lamps_are_to_be_found(frozen: FrozenScene) -> None:
+    camera, lamp = room_cameras(24)[0], rg.PointLight(list(VISIBLE), 0.5)
+    shown = rg.view(frozen, lamp, cameras=camera, images=frozen.render(camera, lamp), port=0)
+    shown.stop()
+    session = shown._exhibit.session()
+    assert len(session.case.photographs) == 1 and session.found is None and session.lights == (lamp,)
+
+
+def test_what_a_fit_left_open_is_looked_for_again(frozen: FrozenScene) -> None:
+    found = replace(dark_result(1.0), lights=(rg.PointLight(list(VISIBLE), 0.5),), exposures=(1.0, 2.0))
+    shown = rg.view(frozen, fit=found, port=0)
+    shown.stop()
+    assert shown._exhibit.finder._exposure_free and not shown._exhibit.finder._ambient
+    assert shown._exhibit.session().lights == found.lights
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        ({"fit": "result"}, "fit: expected"),
+        ({"cameras": room_cameras(8)}, "images: expected one for each camera (2), found 0 of them"),
+        ({"images": torch.ones(8, 8, 3)}, "images: expected one for each camera (0), found 1 of them"),
+        ({"cameras": ["camera"], "images": torch.ones(1, 8, 8, 3)}, "cameras[0]: expected"),
+        (
+            {"cameras": room_cameras(8)[0], "images": torch.ones(8, 9, 3)},
+            "images[0]: expected numbers of shape (8, 8, 3)",
+        ),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(frozen: FrozenScene, given: dict[str, Any], found: str) -> None:
+    with pytest.raises(InputError) as caught:
+        rg.view(frozen, port=0, **given)
+    assert found in str(caught.value)
 
 
 def test_light_from_all_around_is_given_as_radiance(frozen: FrozenScene) -> None:

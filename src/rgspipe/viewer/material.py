@@ -11,6 +11,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from rgspipe.arguments import as_one_of
 from rgspipe.datasets.alternatives_file import ToldAlternative, read_alternatives
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.gs3 import load_target
@@ -24,7 +25,7 @@ from rgspipe.fitting.model.capture import SATURATED, ImageCapture
 from rgspipe.fitting.result_text import as_text, headline, light_lines
 from rgspipe.fitting.words import told_alternative
 from rgspipe.scene import Camera, LightRig
-from rgspipe.scene.arrays import ArrayLike
+from rgspipe.scene.arrays import ArrayLike, as_list, as_tensor, check_finite, check_levels
 
 #: Of photographs of which only some are known with the lamps off.
 HALF_KNOWN = "Lamps cannot be looked for here: only some of the photographs are there with the lamps off, too."
@@ -147,10 +148,27 @@ class Case:
         return cls(target.name, views, truth, found)
 
 
-def as_photographs(cameras: Sequence[Camera], images: Sequence[ArrayLike]) -> list[Photograph]:
-    """Photographs of cameras and their images (H, W, 3)."""
+def as_photographs(cameras: Camera | Sequence[Camera], images: Sequence[ArrayLike] | ArrayLike) -> list[Photograph]:
+    """Photographs of cameras and their images (H, W, 3) of linear radiance; one stands for a list of it.
+
+    Raises:
+        InputError: there are not as many images as cameras, or an image does not fit its camera.
+    """
+    cameras, images = [cameras] if isinstance(cameras, Camera) else list(cameras), as_list(images, axes=3)
+    if len(cameras) != len(images):
+        expected, remedy = f"one for each camera ({len(cameras)})", "Pass both as rg.fit_lights took them."
+        raise InputError("images", expected=expected, found=f"{len(images)} of them", remedy=remedy)
     pairs = enumerate(zip(cameras, images, strict=True))
-    return [Photograph(f"view {index}", camera, torch.as_tensor(image)) for index, (camera, image) in pairs]
+    return [_photograph(index, camera, image) for index, (camera, image) in pairs]
+
+
+def _photograph(index: int, camera: Camera, image: ArrayLike) -> Photograph:
+    camera = as_one_of(camera, Camera, f"cameras[{index}]", "Camera.look_at makes one.")
+    where, size = f"images[{index}]", (camera.height, camera.width, 3)
+    check_levels(where, image)
+    radiance = as_tensor(image, where, size, torch.float32)
+    check_finite(radiance, where, "Make it again.")
+    return Photograph(f"view {index}", camera, radiance.detach().cpu())
 
 
 def case_in(

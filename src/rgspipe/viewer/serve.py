@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING
 
 import torch
 
+from rgspipe.arguments import as_one_of
 from rgspipe.errors import InputError
+from rgspipe.fitting import FitResult
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera
@@ -23,7 +25,7 @@ from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.lights import Light, as_rig
 from rgspipe.viewer.cameras import first_camera, pose_of
 from rgspipe.viewer.lamp_images import LampImages
-from rgspipe.viewer.material import Case, Photograph
+from rgspipe.viewer.material import Case, Found, Photograph, as_photographs
 from rgspipe.viewer.search import Finder
 from rgspipe.viewer.visit import Exhibit
 
@@ -155,6 +157,9 @@ def view(
     scene: FrozenScene,
     lights: Light | Sequence[Light] | None = None,
     *,
+    fit: FitResult | None = None,
+    cameras: Camera | Sequence[Camera] = (),
+    images: Sequence[ArrayLike] | ArrayLike = (),
     camera: Camera | None = None,
     cases: Sequence[Case] = (),
     references: Sequence[Photograph] = (),
@@ -168,11 +173,20 @@ def view(
 ) -> Viewer:
     """Show a scene in the browser, at 127.0.0.1 only; returns at once.
 
+    A fit is shown beside the images that it was made of, with the regions of its lamps, the way of its search, and what
+    it weighed them against:
+
+        result = rg.fit_lights(scene, cameras, images)
+        viewer = rg.view(scene, fit=result, cameras=cameras, images=images)
+
     Args:
         scene: the scene.
-        lights: the lamps at first; if None those of the first case's fit, or one above the middle.
+        lights: the lamps at first; if None those of `fit` or of the first case's fit, or one above the middle.
+        fit: what `fit_lights` found. What it left open besides lamps is left open in searches of the page, too.
+        cameras: of `images`; one stands for a list of it.
+        images: (H, W, 3) linear radiance per camera, under lamps that `fit` found or that are to be found on the page.
         camera: of the first picture; in front of the scene if None.
-        cases: photographs of the scene under lamps that are to be found, with truth and fit where these are known; see
+        cases: further sets of such photographs, with truth and fit where these are known; see
             `rgspipe.viewer.material`.
         references: further photographs, under lamps that are known.
         port: of the page; the next free one where it is taken.
@@ -190,21 +204,30 @@ def view(
     if find_spec("viser") is None:
         raise InputError("viser", expected="the package viser", found="none", remedy='pip install "viser==1.1.1"')
     if not isinstance(scene, FrozenScene):
-        found, remedy = type(scene).__name__, "rg.FrozenScene.load(FOLDER) reads one."
-        raise InputError("scene", expected="a FrozenScene", found=found, remedy=remedy)
+        remedy = "rg.FrozenScene.load(FOLDER) reads one."
+        raise InputError("scene", expected="a FrozenScene", found=type(scene).__name__, remedy=remedy)
     if not 32 <= resolution <= 2048:
         raise InputError("resolution", expected="32 to 2048 pixels", found=str(resolution), remedy="256 is usual.")
     rig = None
     if lights is not None:
         rig = tuple(light.to(torch.float64).detached() for light in as_rig(lights))
-    taken = [photograph for case in cases for photograph in case.photographs]
+    found = None if fit is None else Found.of(as_one_of(fit, FitResult, "fit", "Pass what rg.fit_lights returned."))
+    photographs = as_photographs(cameras, images)
+    own = [Case("given", photographs, found=found)] if found is not None or photographs else []
+    every, known = (*own, *cases), tuple(references)
+    taken = [photograph for case in every for photograph in case.photographs]
     camera = camera or (taken[0].camera if taken else first_camera(*scene.bounds))
     is_open = address not in (LOOPBACK, "localhost")
     around = None
     if not isinstance(ambient, bool | None):
         around = as_tensor(ambient, "ambient", (3,), torch.float64, "rg.read_ambient(FILE) reads it.").detach().cpu()
-    finder = Finder(scene, exposure_free, base_scale_free, around is not None or ambient is True)
-    every, known = tuple(cases), tuple(references)
+    unknowns = (found or Found(())).unknowns
+    finder = Finder(
+        scene,
+        exposure_free or unknowns["exposure_free"],
+        base_scale_free or unknowns["base_scale_free"],
+        around is not None or ambient is True or unknowns["ambient"],
+    )
     exhibit = Exhibit(LampImages(scene), finder, camera, rig, around, every, known, resolution, world or World())
     viewer = Viewer(exhibit, 0 if is_open else port)
     if is_open:
