@@ -62,6 +62,17 @@ def test_the_plan_says_why(config: RgspipeConfig) -> None:
     assert "reuse" in text and "make" in text and "views.count 3 → 2" in text
 
 
+def test_the_plan_compares_with_what_differs_least(config: RgspipeConfig) -> None:
+    """It compared with whatever ran last, and named what nobody had changed."""
+    grow = with_changes(config, {"stage": "grow", "views.count": 3})
+    run(grow, toys.load)
+    run(with_changes(grow, {"views.count": 1, "dataset.resolution": 9}), toys.load)
+    two = with_changes(grow, {"views.count": 2})
+    assert planned(two)[-1] == ("grow", False, "views.count 3 → 2")
+    run(with_changes(grow, {"views.count": 5}), toys.load)
+    assert planned(two)[-1] == ("grow", False, "views.count 5 → 2")
+
+
 def test_the_plan_says_what_it_will_take_where_that_is_known(config: RgspipeConfig) -> None:
     def text(changes: dict[str, object]) -> list[str]:
         changed = with_changes(config, changes)

@@ -17,6 +17,7 @@ from rgspipe.config.spoken import told_with_keys
 from rgspipe.datasets.reading_limits import reading_within
 from rgspipe.errors import InputError
 from rgspipe.graph.commands import as_override, command
+from rgspipe.graph.earlier import last_made, nearest
 from rgspipe.graph.expected_time import EarlierRuns, Expected, in_words
 from rgspipe.graph.nodes import Making, Node, indispensable
 from rgspipe.graph.resolver import Resolver, StageLoader
@@ -90,14 +91,15 @@ def plan(root: Node, store: ArtifactStore) -> list[PlannedStep]:
 
 
 def _reason(node: Node, store: ArtifactStore) -> str:
+    """Why a node is made: what tells it from what was made before and differs least, or from nothing."""
     if (damage := store.damage(node.key)) is not None:
         return f"{damage.where} is damaged: {damage.found}"
     if store.partial(node.key).exists():
         return "goes on where it was interrupted"
-    newest = store.newest(node.key.scene, node.key.stage)
-    if newest is None:
+    made = last_made(store, node.key.scene, node.key.stage)
+    if not made:
         return "not made yet"
-    causes = differences(node.recipe, newest.manifest)
+    _, causes = nearest(made, lambda one: differences(node.recipe, one))
     shown = ", ".join(causes[:SHOWN_CAUSES]) or "the one that was made is gone"
     return shown + (f" and {len(causes) - SHOWN_CAUSES} more" if len(causes) > SHOWN_CAUSES else "")
 
