@@ -117,3 +117,17 @@ def test_a_listener_hears_at_once_of_what_goes_on_after_long_work(monkeypatch: p
         with progress.progress_bar([], "lights", total=4):
             assert told == ["lights"]
     assert told == ["lights", ""]
+
+
+def test_jobs_side_by_side_are_told_by_their_names(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In whole lines even on a terminal, where they would write over each other's."""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with progress.progress_of_job("views.count=3"):
+        tracked(monkeypatch, range(25), seconds=2.0)
+    text = capsys.readouterr().err
+    assert "\r" not in text and all(line.startswith("views.count=3: steps: ") for line in text.splitlines())
+    with progress.progress_of_job(""):
+        tracked(monkeypatch, range(25), seconds=2.0)
+    assert re.match(r"\rsteps: ", capsys.readouterr().err)

@@ -17,6 +17,7 @@ from rgspipe.cli import main
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.reading_limits import reading_limits
 from rgspipe.errors import InputError
+from rgspipe.progress import progress_bar
 from rgspipe.stages.base import Failure, Need, Stage, StageContext
 from rgspipe.store.files import replacing, write_text
 from rgspipe.store.whole_files import WholeFiles
@@ -50,7 +51,7 @@ def _grow(context: StageContext) -> None:
     total = sum(int(number) for row in rows for number in row)
     write_text(context.folder / "total.txt", f"{total * context.config.views.count}\n")
     context.note(threads=os.environ.get("OMP_NUM_THREADS"), spinning=os.environ.get("OMP_WAIT_POLICY"))
-    context.note(pixels=reading_limits().pixels)
+    context.note(pixels=reading_limits().pixels, progress=progress_bar([], "adding").desc)
 
 
 def _harvest(context: StageContext) -> None:

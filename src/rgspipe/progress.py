@@ -22,6 +22,9 @@ Listener = Callable[[str], object]
 #: Who listens, and since when.
 _LISTENER: ContextVar[tuple[Listener, float] | None] = ContextVar("listener", default=None)
 
+#: What tells this job from those beside it; empty where it is alone.
+_JOB: ContextVar[str] = ContextVar("job", default="")
+
 #: As tqdm's own, with the time that is left of everything.
 _FORMAT = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}, {left} left{postfix}]"
 
@@ -124,6 +127,22 @@ def progress_told(listener: Listener) -> Iterator[None]:
         _LISTENER.reset(token)
 
 
+@contextmanager
+def progress_of_job(name: str) -> Iterator[None]:
+    """Let the progress of work within the block, in this thread, begin with the name of its job.
+
+    It comes in whole lines, on a terminal too, where jobs that run side by side would write over each other's.
+
+    Args:
+        name: tells the job from the others; empty where it is alone, so that all stays as it is.
+    """
+    token = _JOB.set(name)
+    try:
+        yield
+    finally:
+        _JOB.reset(token)
+
+
 def progress_bar(
     items: Iterable[Item],
     description: str,
@@ -136,10 +155,10 @@ def progress_bar(
 ) -> ProgressBar:
     """Iterate over `items` while a progress line with an estimate stands on stderr.
 
-    On a terminal the line is written over; in a log a new one comes every ten seconds; within `progress_told` it is
-    given to a listener. The returned bar can be iterated over, or updated by hand (`bar.update(1)`) in a `with` block,
-    where `bar.begin(total, done)` may say later how much there is; `bar.set_postfix_str("38.2 dB", refresh=False)`
-    shows a figure beside the estimate.
+    On a terminal the line is written over; in a log, and within `progress_of_job`, a new one comes every ten seconds;
+    within `progress_told` it is given to a listener. The returned bar can be iterated over, or updated by hand
+    (`bar.update(1)`) in a `with` block, where `bar.begin(total, done)` may say later how much there is;
+    `bar.set_postfix_str("38.2 dB", refresh=False)` shows a figure beside the estimate.
 
     Args:
         total: of items, those done before and later included; by default how many `items` has.
@@ -150,11 +169,11 @@ def progress_bar(
             of many, which have a line, it has one only after ten seconds.
     """
     even = {"bar_format": _WHOLE, "smoothing": 0.0, "miniters": 0} if whole else {}
-    told = _LISTENER.get() is not None
-    interactive = sys.stderr.isatty() and not told
+    told, job = _LISTENER.get() is not None, _JOB.get()
+    interactive = sys.stderr.isatty() and not told and not job
     return (_Words if told else ProgressBar if interactive else _Lines)(
         items,
-        desc=description,
+        desc=f"{job}: {description}" if job else description,
         total=total,
         unit=unit,
         initial=done,

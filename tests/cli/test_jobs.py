@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -71,3 +72,23 @@ def test_jobs_that_never_began_are_told(
     said = capfd.readouterr().out
     assert f"{states.count('done')} of 4 jobs done" in said
     assert len((sweep / "table.csv").read_text().splitlines()) == 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (["hydra.launcher.n_jobs=2", f"scene.name={'a' * 40},b"], {"job 0: ", "scene.name=b: "}),
+        (["hydra.launcher.n_jobs=1", "views.count=1,2"], {""}),
+        (["launcher=basic", "views.count=1,2"], {""}),
+    ],
+    ids=["two at once", "one at once", "one by one"],
+)
+def test_progress_of_jobs_side_by_side_says_whose_it_is(
+    arguments: list[str], names: set[str], tmp_path: Path, child_environment: dict[str, str]
+) -> None:
+    """It could not be told apart."""
+    command = [sys.executable, "-m", "toys", "-m", "stage=grow", "outputs=here", *arguments]
+    subprocess.run(command, cwd=tmp_path, env=child_environment, check=True, capture_output=True)
+    made = [status for path in (tmp_path / "here/runs").iterdir() for _, status in read_statuses(path)]
+    manifests = [json.loads((tmp_path / status["result"] / "manifest.json").read_text()) for status in made]
+    assert {manifest["facts"]["progress"] for manifest in manifests} == {f"{name}adding" for name in names}

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import hydra
+from hydra.conf import HydraConf
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig
@@ -34,7 +35,9 @@ from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import Usual, run
 from rgspipe.graph.resolver import StageLoader
+from rgspipe.graph.variants import key_of
 from rgspipe.plain_values import quoted
+from rgspipe.progress import progress_of_job
 from rgspipe.stages import load_stage
 from rgspipe.store.artifacts import Artifact
 from rgspipe.store.files import NO_RIGHT
@@ -45,6 +48,9 @@ RUN_BYTES = 2**16
 
 #: Stages whose result is told in lines on the terminal.
 TOLD = ("fit_light", "track", "evaluate")
+
+#: Letters of the name of a job beside others; one that is longer leaves no room for its progress.
+LONGEST_NAME = 40
 
 #: What became of jobs of a sweep that was over before they began.
 UNBEGUN = "did not begin, as the process of another job ended, and the sweep with it; mostly there was no memory left"
@@ -185,7 +191,8 @@ def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual | None, fou
     wanted = bool(values.debug.traceback)
     try:
         config = typed(values)
-        artifact = run(config, stage_loader, overrides, usual)
+        with progress_of_job(_name_beside_others(settings, usual)):
+            artifact = run(config, stage_loader, overrides, usual)
     except InputError as error:
         status.failed(error, EXIT_INPUT)
         show_input_error(error, wanted)
@@ -204,6 +211,14 @@ def _job(values: DictConfig, stage_loader: StageLoader, usual: Usual | None, fou
     if settings.mode == RunMode.RUN:
         found += [*_outcome(artifact), f"Result: {artifact.path}"]
     return 0
+
+
+def _name_beside_others(settings: HydraConf, usual: Usual | None) -> str:
+    """What tells a job from those that run beside it, such as "scene=zoo views.count=3"; empty where none does."""
+    if usual is None or settings.runtime.choices["hydra/launcher"] != "joblib" or settings.launcher.n_jobs == 1:
+        return ""
+    name = " ".join(text for text in settings.overrides.task if key_of(text) in usual.swept)
+    return name if len(name) <= LONGEST_NAME else f"job {settings.job.num}"
 
 
 def _outcome(artifact: Artifact) -> list[str]:
