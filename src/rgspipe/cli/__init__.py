@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rgspipe.cli.commands import COMMANDS
-from rgspipe.cli.completion import LINE, completed, is_question
+from rgspipe.cli.completion import FLAGS as COMPLETION_FLAGS
+from rgspipe.cli.completion import answered
 from rgspipe.cli.help import help_text, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
@@ -113,9 +114,10 @@ def _dispatch(arguments: list[str], stage_loader: StageLoader) -> int:
     if arguments[0] == "--version":
         print(version_text())
         return 0
-    if is_question(arguments):
-        words, is_open = completed(os.environ.get(LINE, ""))
-        print("\n".join(words))
+    if arguments[0] in COMPLETION_FLAGS:
+        answer, is_open = answered(arguments)
+        if answer:
+            print(answer)
         if not is_open:
             return 0
     _check_working_folder()

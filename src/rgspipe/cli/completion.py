@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.help import pipelines, topics
+from rgspipe.errors import InputError
+from rgspipe.program import typed
 from rgspipe.stages import NAMES
 
 #: How a shell asks, and where it says for which line.
@@ -18,10 +21,55 @@ FIRST: Mapping[str, Sequence[str]] = {
     "--version": (),
 }
 
+#: What is asked about a shell: what makes its tab key complete, what ends that, and, by itself, how a line can go on.
+VERBS, SHELLS = ("install", "uninstall", "query"), ("bash", "zsh", "fish")
 
-def is_question(arguments: Sequence[str]) -> bool:
-    """Whether a shell asks how a line can go on."""
-    return len(arguments) == 2 and arguments[0] in FLAGS and arguments[1].startswith("query=")
+#: Lets zsh take bash's function.
+ZSH = """\
+(( $+functions[compdef] )) || { autoload -Uz compinit && compinit -i }
+autoload -Uz bashcompinit && bashcompinit
+"""
+
+#: Of its own: Hydra's has no files, and takes them from Python's lines too.
+FISH = """\
+function hydra_fish_completion
+    set -lx COMP_LINE (commandline -cp)
+    set -l words (rgspipe --shell-completion query=fish)
+    if test -n "$words"
+        printf '%s\\n' $words
+    else
+        set -l key (string match -r '^[^=]*=' -- (commandline -ct))
+        set -l path (string replace -r '^[^=]*=' '' -- (commandline -ct))
+        __fish_complete_path $path | string replace -r '^' "$key"
+    end
+end
+complete -c rgspipe -f -a '(hydra_fish_completion)'
+"""
+
+
+def answered(arguments: Sequence[str]) -> tuple[str, bool]:
+    """What a shell is told, empty for nothing, and whether Hydra, which knows groups, keys and bash, adds to it.
+
+    Args:
+        arguments: those of the command line, from one of FLAGS on.
+
+    Raises:
+        InputError: nobody knows that shell, or what is wanted of it.
+    """
+    verb, _, shell = arguments[1].partition("=") if len(arguments) == 2 else ("", "", "")
+    if verb not in VERBS or shell not in SHELLS:
+        raise InputError(
+            arguments[0],
+            expected=f"install or uninstall, and one of {', '.join(SHELLS)}",
+            found=" ".join(arguments[1:]) or "nothing",
+            remedy=f"Try {typed(FLAGS[1], 'install=bash')}; other shells are not known, and work without the tab key.",
+        )
+    if verb == "query":
+        words, is_open = completed(os.environ.get(LINE, ""))
+        return "\n".join(words), is_open
+    if verb == "install":
+        return {"zsh": ZSH, "fish": FISH}.get(shell, ""), shell != "fish"
+    return "", True
 
 
 def completed(line: str) -> tuple[list[str], bool]:

@@ -92,7 +92,8 @@ Options, anywhere on the line
   --cfg job                 show the whole configuration instead of running it
   debug.traceback=true      show tracebacks (or set RGSPIPE_TRACEBACK=1)
   --shell-completion install=bash
-                            for eval: the tab key completes stages and keys
+                            for eval: the tab key completes stages and keys;
+                            install=zsh; install=fish, for source
   --version                 of rgspipe, Python and the libraries
   --hydra-help              options of Hydra, which reads the command line
 
