@@ -13,7 +13,7 @@ import pytest
 import rgspipe as rg
 from rgspipe.cli import main
 from rgspipe.cli.commands import COMMANDS
-from rgspipe.cli.help import PAGES, help_text, topics
+from rgspipe.cli.help import PAGES, help_text, sections, topics
 from rgspipe.cli.messages import show_input_error
 from rgspipe.errors import InputError
 from rgspipe.stages import NAMES
@@ -101,7 +101,7 @@ def test_help_explains_stages_scenes_groups_and_keys_without_torch(rgspipe) -> N
     told = rgspipe("--help", *PAGES).stdout
     for word in (*NAMES, "external", "draft | reference | standard", "upstream=require", "--dry-run", "dataset"):
         assert word in told
-    assert "8 to 8192" in rgspipe("--help", "dataset").stdout
+    assert "8 to 8192" in rgspipe("--help", "dataset.resolution").stdout
     code = "import sys; from rgspipe.cli import main; main(['--help']); sys.exit('torch' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True).returncode == 0
 
@@ -113,8 +113,36 @@ def test_help_fits_a_screen(asked: tuple[str, ...]) -> None:
     assert len(shown) <= 23 and max(map(len, shown)) <= 80
 
 
+#: Sections with more keys than a screen has lines.
+LONG_SECTIONS = {"train"}
+
+
+def test_help_of_a_section_fits_a_screen() -> None:
+    """Those of 200 lines were as long as their keys' texts; parts of sections, such as fit.search, count as well."""
+    keys = [setting.key.split(".") for settings in sections().values() for setting in settings]
+    parts = dict.fromkeys(".".join(key[:depth]) for key in keys for depth in range(1, len(key)))
+    shown = {part: help_text([part]).splitlines() for part in parts}
+    assert {part for part, lines in shown.items() if len(lines) > 23} <= LONG_SECTIONS
+    assert max(len(lines) for lines in shown.values()) <= 40
+    assert max(len(line) for lines in shown.values() for line in lines) <= 80
+    assert {"fit", "fit.search", "fit.search.bar"} < parts.keys()
+
+
+def test_help_of_a_section_leads_to_all_that_its_keys_say() -> None:
+    fit = {setting.key: setting for setting in sections()["fit"]}
+    listed = help_text(["fit"])
+    assert "--help KEY" in listed and "--help fit.search" in listed and "--help fit --all" in listed
+    assert all(f"  {key} " in listed for key in fit if key.count(".") == 1)
+    assert "39 keys: starts, " in listed and "  fit.search.starts " in help_text(["fit.search"])
+    whole = help_text(["fit", "--all"])
+    for key, setting in fit.items():
+        assert help_text([key]) in whole
+        assert " ".join(setting.meaning.split()) in " ".join(help_text([key]).split())
+
+
 def test_no_line_of_help_is_wider_than_a_terminal() -> None:
-    assert [line for line in help_text(list(topics())).splitlines() if len(line) > 80] == []
+    shown = help_text(list(topics())) + help_text([*topics(), "--all"])
+    assert [line for line in shown.splitlines() if len(line) > 80] == []
 
 
 def test_a_stage_is_explained_and_the_version_told(rgspipe) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import platform
+import re
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +22,12 @@ from rgspipe.stages import NAMES, stage_summary, stage_text
 
 #: Columns of what is printed: those of a terminal as it opens.
 WIDTH = 80
+
+#: Lines that such a terminal has beside the next prompt; keys that take more are listed by a line each.
+SCREEN = 23
+
+#: Beside a topic: all that there is to say of it, however long.
+ALL = "--all"
 
 #: Sections of settings that steer a stage of another name.
 STAGE_SECTIONS = {
@@ -94,6 +101,7 @@ Options, anywhere on the line
   --shell-completion install=bash
                             for eval: the tab key completes stages and keys;
                             install=zsh; install=fish, for source
+  --help SECTION --all      what each of a section's keys means
   --version                 of rgspipe, Python and the libraries
   --hydra-help              options of Hydra, which reads the command line
 
@@ -136,10 +144,14 @@ def pipelines() -> list[str]:
 def help_text(topics: Sequence[str] = ()) -> str:
     """What to begin with, on a screen; or a page, a stage, a command, or the keys of one section or group.
 
+    Args:
+        topics: names of these; ALL among them asks for every key's text where their number makes it a list.
+
     Raises:
         InputError: there is no such topic.
     """
-    return "\n\n".join(map(_topic, topics)) if topics else FRONT
+    texts = [_topic(topic, ALL in topics) for topic in topics if topic != ALL]
+    return "\n\n".join(texts) or FRONT
 
 
 def version_text() -> str:
@@ -161,7 +173,7 @@ def _groups() -> str:
 
 def _keys() -> str:
     names = _wrapped(", ".join(name for name in sections() if name), "  ")
-    head = "Sections of keys; --help SECTION lists them with units, ranges and defaults"
+    head = "Sections of keys; --help SECTION lists them, --help KEY has unit, range, default"
     alone = f"Keys without a section: {', '.join(row.key for row in sections()[''])}"
     return "\n".join([head, "", names, "", _wrapped(alone, "")])
 
@@ -205,20 +217,49 @@ def _stage(name: str) -> str:
     return "\n".join([f"stage={name}", "", text, *(["", "Its settings:", *keys] if keys else [])])
 
 
-def _topic(topic: str) -> str:
+def _topic(topic: str, every_text: bool) -> str:
     if topic in PAGES:
         return PAGES[topic]()
     if topic in COMMANDS:
         return COMMANDS[topic].text
-    every = [setting for settings in sections().values() for setting in settings]
-    rows = [setting for setting in every if setting.key == topic or setting.key.startswith(f"{topic}.")]
+    known = [setting for settings in sections().values() for setting in settings]
+    rows = [setting for setting in known if setting.key == topic or setting.key.startswith(f"{topic}.")]
     lines = [_stage(topic)] if topic in NAMES else []
     lines += (
         [f"{topic}={_wrapped(_choices(groups()[topic]), ' ' * (len(topic) + 1)).lstrip()}"] if topic in groups() else []
     )
     if not lines and not rows:
-        lines = _chosen(topic) or _refuse(topic, [setting.key for setting in every])
-    return "\n".join([*lines, *map(_setting, rows)])
+        lines = _chosen(topic) or _refuse(topic, [setting.key for setting in known])
+    whole = "\n".join([*lines, *map(_setting, rows)])
+    if every_text or len(rows) < 2 or whole.count("\n") < SCREEN:
+        return whole
+    return "\n".join([*lines, *_listed(topic, rows)])
+
+
+def _listed(section: str, settings: Sequence[SettingHelp]) -> list[str]:
+    """The keys of a section by the beginning of what they mean, those of sections within it by name; and what leads on.
+
+    A section within it has one line.
+    """
+    rows, within = {}, {}
+    for setting in settings:
+        name, _, inner = setting.key.removeprefix(f"{section}.").partition(".")
+        if inner:
+            within.setdefault(f"{section}.{name}", []).append(inner.partition(".")[0])
+        else:
+            rows[setting.key] = setting.meaning
+    for part, names in within.items():
+        rows[f"{part}.*"] = f"{len(names)} key{'s'[: len(names) - 1]}: {', '.join(dict.fromkeys(names))}"
+    width = max(map(len, rows)) + 2
+    lines = [f"  {key:<{width}}{_beginning(meaning, WIDTH - 2 - width)}" for key, meaning in rows.items()]
+    parts = "".join(f", --help {part}" for part in list(within)[:1])
+    return [*lines, f"More: --help KEY{parts}; all: --help {section} {ALL}"]
+
+
+def _beginning(meaning: str, width: int) -> str:
+    """Its first clause, without the range where that finds no room."""
+    first = meaning.partition(";")[0]
+    return first if len(first) <= width else _shortened(re.sub(r" \([^()]*\)$", "", first), width)
 
 
 def _setting(setting: SettingHelp) -> str:
