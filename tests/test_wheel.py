@@ -58,6 +58,22 @@ def test_an_unpacked_wheel_runs_from_any_folder(site: Path, tmp_path: Path) -> N
     assert not list(tmp_path.iterdir())
 
 
+def test_an_installed_wheel_has_a_program_that_runs_from_any_folder(wheel: Path, tmp_path: Path) -> None:
+    """As the install guide says, which calls the file by its name."""
+    guide = (ROOT / "docs/guides/install.md").read_text(encoding="utf-8")
+    assert f"pip install dist/{wheel.name}" in guide and "rgspipe doctor check=false" in guide
+    site = tmp_path / "site"
+    command = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-index", "--target", str(site), str(wheel)]
+    subprocess.run(command, check=True, capture_output=True)
+    environment, folder = {**os.environ, "PYTHONPATH": str(site)}, tmp_path / "else"
+    folder.mkdir()
+    for words, said in ((["--version"], "rgspipe 0."), (["doctor", "check=false"], "Everything that is needed works.")):
+        program = [site / "bin" / "rgspipe", *words]
+        run = subprocess.run(program, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+        assert run.returncode == 0 and said in run.stdout, run.stderr
+    assert not list(folder.iterdir())
+
+
 @pytest.mark.slow
 def test_the_demo_comes_along(site: Path, tmp_path: Path) -> None:
     """6 s of processor time; nothing but the wheel is read, and nothing written where it runs."""
