@@ -76,6 +76,15 @@ def test_what_is_missing_beyond_that_is_said_with_what_it_would_give(
     assert "pytest, ruff are missing: tests, " in said and said.count('pip install "rgspipe[dev]"') == 1
 
 
+def test_how_to_have_blender_is_said_in_the_words_of_the_command_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(command, "optional_parts", lambda: [Distribution("bpy", "==5.0.1", None, "", "blender")])
+    assert main(["doctor", f"outputs={tmp_path}", "check=false"]) == 0
+    said = told(capsys)
+    assert "(blender.python=PATH)" in said and "(blender.executable=PATH)" in said and "BlenderOptions" not in said
+
+
 @pytest.mark.parametrize("value", [0.2, math.nan])
 def test_figures_that_are_wrong_end_with_status_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, value: float

@@ -125,7 +125,7 @@ def _extra(parts: Sequence[Distribution], gives: str) -> list[str]:
     if missing := [part for part in parts if part.version is None]:
         names, what = ", ".join(part.name for part in missing), "" if there else f": {gives}"
         are, them = ("is", "it") if len(missing) == 1 else ("are", "them")
-        lines.append(_wrapped(f"{names} {are} missing{what}. To have {them}: {missing[0].remedy}", "  "))
+        lines.append(_wrapped(f"{names} {are} missing{what}. To have {them}: {as_keys(missing[0].remedy)}", "  "))
     for part in parts:
         if part.fault:
             lines.append(
