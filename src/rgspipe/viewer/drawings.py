@@ -17,10 +17,10 @@ from rgspipe.viewer.material import Found, Photograph
 
 #: Lengths of the frustums of cameras whose photographs are searched and of others, and radii of the balls of true lamps
 #: and of alternatives, of the scene's size.
-FRUSTUM, FURTHER, TRUTH, OTHER = 0.06, 0.035, 0.015, 0.009
+FRUSTUM, FURTHER, TRUTH, OTHER = 0.06, 0.022, 0.015, 0.009
 
-#: At most so many of the others are drawn: more hide the scene.
-MOST_FURTHER = 40
+#: At most so many of the others are drawn: forty hid the scene.
+MOST_FURTHER = 12
 
 #: What can be hidden together: by the name of its node a label and a line of help.
 KINDS = {
@@ -84,16 +84,16 @@ class Drawings:
         """
         _clear(self._frusta)
         some = [others[index] for index in spread_frames(len(others), MOST_FURTHER)]
-        styles = [(one, _TAKEN, FRUSTUM) for one in searched] + [(one, _FURTHER, FURTHER) for one in some]
-        for index, (one, colour, length) in enumerate(styles):
-            self._frusta.append(self._frustum(f"/cameras/{index}", one.camera, colour, partial(look, one), length))
+        styles = [(one, _TAKEN, FRUSTUM, 2.0) for one in searched] + [(one, _FURTHER, FURTHER, 1.0) for one in some]
+        for index, (one, *style) in enumerate(styles):
+            self._frusta.append(self._frustum(f"/cameras/{index}", one.camera, partial(look, one), *style))
         self._hide()
 
     def advised(self, camera: Camera | None) -> None:
         """The camera that would tell most."""
         _clear(self._advised)
         if camera is not None:
-            self._advised.append(self._frustum("/cameras/advised", camera, _ADVISED, partial(self._go_to, camera)))
+            self._advised.append(self._frustum("/cameras/advised", camera, partial(self._go_to, camera), _ADVISED))
 
     def seen_from(self, camera: Camera) -> None:
         """The visitor looks through another camera, whose own frustum is hidden."""
@@ -124,9 +124,10 @@ class Drawings:
         self,
         name: str,
         camera: Camera,
-        colour: tuple[int, int, int],
         clicked: Callable[[], None],
+        colour: tuple[int, int, int],
         length: float = FRUSTUM,
+        thickness: float = 2.0,
     ) -> viser.CameraFrustumHandle:
         position, wxyz, fov = pose_of(camera)
         frustum = self._scene.add_camera_frustum(
@@ -134,7 +135,7 @@ class Drawings:
             fov,
             camera.width / camera.height,
             scale=length * self._size,
-            thickness=2.0,
+            thickness=thickness,
             thickness_units="screen",
             color=colour,
             wxyz=wxyz,
