@@ -174,10 +174,7 @@ def view(
     """Show a scene in the browser, at 127.0.0.1 only; returns at once.
 
     A fit is shown beside the images that it was made of, with the regions of its lamps, the way of its search, and what
-    it weighed them against:
-
-        result = rg.fit_lights(scene, cameras, images)
-        viewer = rg.view(scene, fit=result, cameras=cameras, images=images)
+    it weighed them against.
 
     Args:
         scene: the scene.
