@@ -112,7 +112,6 @@ def _photograph(
     lux.Init(lambda *_: None)
     scene = lux.Scene()
     scene.Parse(properties("scene.camera.", _camera(shot)))
-
     for index, lamp in enumerate(lamps):
         scene.Parse(properties(f"scene.lights.lamp_{index}.", _point(lamp)))
     for name, shape in shapes.items():
