@@ -122,5 +122,5 @@ def test_pixels_where_surfels_overhang_the_object_say_nothing(room: Surfels) -> 
     alpha[:, 12:] = 0.0
     view = replace(view, image=torch.ones(24, 24, 3) * alpha[..., None], alpha=alpha)
     problem = AlbedoProblem.build(room, models_of(room, [view], at_pixels=False), [view])
-    weight = problem.pixel_weights[0].reshape(24, 24)
-    assert bool((weight[:, :12] > 0.0).all()) and bool((weight[:, 12:] == 0.0).all())
+    trust = problem.photographs.trust[0].reshape(24, 24)
+    assert bool((trust[:, :12] == 1.0).all()) and bool((trust[:, 12:] == 0.0).all())

@@ -104,7 +104,7 @@ def test_a_step_that_leads_too_far_is_halved(linear: tuple) -> None:
     """From 0.6 the whole step leads to images that are worse: light that bounces grows faster than its derivative."""
     at, problem, _, room = linear
     laplacian = graph_laplacian(problem.neighbours, room.normals.float(), None)
-    quadratic = Quadratic.of(at, problem.pixel_weights, laplacian, pull(None, at.albedo))
+    quadratic = Quadratic.of(at, problem.photographs.weights(), laplacian, pull(None, at.albedo))
     step = quadratic.step(Ties(room))
     assert quadratic.loss(at.moved(step)) > 2.0 * quadratic.loss(at)  # measured 2.4
     assert quadratic.loss(no_worse(at, quadratic, step)) < 0.5 * quadratic.loss(at)
@@ -113,7 +113,7 @@ def test_a_step_that_leads_too_far_is_halved(linear: tuple) -> None:
 def test_a_step_that_makes_all_worse_is_not_taken(linear: tuple) -> None:
     at, problem, _, room = linear
     laplacian = graph_laplacian(problem.neighbours, room.normals.float(), None)
-    quadratic = Quadratic.of(at, problem.pixel_weights, laplacian, pull(None, at.albedo))
+    quadratic = Quadratic.of(at, problem.photographs.weights(), laplacian, pull(None, at.albedo))
     assert no_worse(at, quadratic, torch.full_like(at.albedo, -10.0)) is at
 
 

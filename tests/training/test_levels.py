@@ -7,7 +7,6 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rgspipe.training.albedo import robust_weights
 from rgspipe.training.levels import level, levels, peak
 
 
@@ -35,12 +34,3 @@ def test_levels_go_with_the_unit_of_radiance(scale: float) -> None:
     scaled = levels([scale * one for one in photographs], shown)
     for found, expected in zip(scaled, levels(photographs, shown), strict=True):
         assert float(found) == pytest.approx(scale * float(expected), rel=1e-5)  # Measured 3e-7, float32.
-
-
-def test_a_view_that_fits_badly_as_a_whole_weighs_less() -> None:
-    """One of nine that is wrong all over, as where something unseen shades its lamp: its own pixels are all alike."""
-    photographs = [image(1.0)] * 8 + [image(1e-3)]
-    renders = [image(1.0 + 0.01 * k) for k in range(1, 9)] + [image(1.0)]
-    weights = robust_weights(photographs, [torch.tensor(1.0)] * 9, [torch.ones(100)] * 9, renders)
-    # Measured 0.0004 of the others.
-    assert float(weights[-1].mean()) < 1e-3 * float(weights[0].mean())

@@ -17,7 +17,7 @@ from rgspipe.optim.conjugate_gradients import conjugate_gradients
 from rgspipe.progress import progress_bar
 from rgspipe.renderer.transport import PatchTransport, with_albedo
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior, AlbedoProblem, robust_weights
+from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior, AlbedoProblem
 from rgspipe.training.lighting import LIGHTINGS_AT_ONCE, Lighting, indirect_irradiance
 from rgspipe.training.likeness import Laplacian, graph_laplacian
 from rgspipe.training.ties import Ties
@@ -49,10 +49,10 @@ def solve_albedo(
     """
     ties, guessed = Ties(surfels), surfels.guessed > 0.0
     at = Linearised.of(problem, lighting, ties.started(surfels.albedo.float().clamp(*ALBEDO_RANGE)), transport)
-    normals, pixel_weights = surfels.normals.float(), problem.pixel_weights
+    normals, pixel_weights = surfels.normals.float(), problem.photographs.weights()
     for index in progress_bar(range(rounds), "albedo", unit="round"):
         if index > 0:
-            pixel_weights = robust_weights(problem.images, problem.levels, problem.pixel_weights, at.renders)
+            pixel_weights = problem.photographs.robust_weights(at.renders)
         laplacian = graph_laplacian(problem.neighbours, normals, at.albedo if index > 1 else None, guessed)
         pulls = pulled_to_kin(pull(prior, at.albedo), ties, at.albedo)
         quadratic = Quadratic.of(at, pixel_weights, laplacian, pulls)
@@ -92,7 +92,7 @@ class Linearised:
         if transport is not None:
             transport = with_albedo(transport, albedo)
             indirect = indirect_irradiance(lighting, albedo, transport)
-        renders = [problem.render(v, albedo, indirect) for v in range(len(problem.images))]
+        renders = [problem.render(v, albedo, indirect) for v in range(len(problem.models))]
         return cls(problem, lighting, albedo, transport, indirect, renders)
 
     def moved(self, change: Tensor) -> Linearised:
@@ -168,7 +168,7 @@ class Quadratic:
     def step(self, ties: Ties) -> Tensor:
         """(N, 3) change of the albedo by a few conjugate-gradient steps, each channel on its own."""
         at = self.at
-        missing = [image - render for image, render in zip(at.problem.images, at.renders, strict=True)]
+        missing = [image - render for image, render in zip(at.problem.photographs.images, at.renders, strict=True)]
         right = at.transposed(self._weighted(missing)) + self.weight * (self.target - at.albedo)
         right = ties.summed(right - self.smoothness * (self.laplacian.matrix @ at.albedo))
         precondition = 1.0 / ties.summed(self.diagonal)
@@ -179,7 +179,7 @@ class Quadratic:
 
     def loss(self, at: Linearised) -> float:
         """What is minimised, at another albedo and its own images; float64."""
-        squared = zip(self.pixel_weights, self.at.problem.images, at.renders, strict=True)
+        squared = zip(self.pixel_weights, self.at.problem.photographs.images, at.renders, strict=True)
         images = sum(float((w[:, None] * (a - b).square()).sum(dtype=torch.float64)) for w, a, b in squared)
         smooth = self.smoothness * float((at.albedo * (self.laplacian.matrix @ at.albedo)).sum(dtype=torch.float64))
         return images + smooth + float((self.weight * (at.albedo - self.target).square()).sum(dtype=torch.float64))

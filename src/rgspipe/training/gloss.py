@@ -20,13 +20,14 @@ from rgspipe.renderer.transport import PatchTransport, with_albedo
 from rgspipe.scene.camera import Camera
 from rgspipe.scene.gloss import Gloss
 from rgspipe.scene.surfels import Surfels
-from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior, AlbedoProblem, robust_weights
+from rgspipe.training.albedo import ALBEDO_RANGE, AlbedoPrior
 from rgspipe.training.gloss_light import GlossBounces, OperatorsOf, highlight_light
 from rgspipe.training.gloss_model import GlossLight, GlossView, Reflection, centre_cosines
 from rgspipe.training.gloss_search import find_lobes, searched_views
 from rgspipe.training.gloss_solve import GlossProblem
 from rgspipe.training.lighting import Lighting
 from rgspipe.training.mixing import DAMPING, Mixing
+from rgspipe.training.photographs import Photographs
 from rgspipe.training.view_model import LitViewModel
 
 #: Mean specular reflectance below which a surfel is diffuse.
@@ -95,7 +96,7 @@ class GlossFit:
 
 def fit_gloss(
     scene: GlossScene,
-    problem: AlbedoProblem,
+    photographs: Photographs,
     start: Surfels,
     indirect: Tensor | None,
     rounds: int,
@@ -105,7 +106,7 @@ def fit_gloss(
     """Albedo and gloss that explain the images best; None if no lobe pays.
 
     Args:
-        problem: images and pixels' weights.
+        photographs: of the scene's views.
         start: the surfels with albedo and, if lobes have been found before, gloss.
         indirect: (V, N, 3) light from other surfels over π without gloss; only where lobes are searched for.
         rounds: of a step and the light that belongs to it.
@@ -113,35 +114,35 @@ def fit_gloss(
         seed: of the patches that are searched.
     """
     edges = [model.weights.edges for model in scene.models]
-    weights = [w * torch.where(e, EDGE_WEIGHT, 1.0) for w, e in zip(problem.pixel_weights, edges, strict=True)]
+    trust = [share * torch.where(edge, EDGE_WEIGHT, 1.0) for share, edge in zip(photographs.trust, edges, strict=True)]
+    photographs = replace(photographs, trust=trust)
     if start.gloss is None:
-        chosen, logs = _found(scene, problem, start, indirect, weights, seed)
+        chosen, logs = _found(scene, photographs, start, indirect, seed)
         at = Reflection(start.albedo.float(), logs.new_zeros(len(chosen), 3), logs)
     else:
         chosen, at = reflection_of(start)
     if len(chosen) == 0:
         return None
-    pixels = problem.levels, weights
-    solved = _solve(scene, GlossProblem.build(start, scene.models, problem.images, chosen, prior), at, pixels, rounds)
+    glossy = GlossProblem.build(start, scene.models, photographs.images, chosen, prior)
+    solved = _solve(scene, glossy, at, photographs, rounds)
     surfels = _without_faint(replace(start, albedo=solved.albedo), chosen, solved)
     return render_gloss(scene, surfels) if len(surfels.gloss.glossy) else None
 
 
 def _found(
     scene: GlossScene,
-    problem: AlbedoProblem,
+    photographs: Photographs,
     surfels: Surfels,
     indirect: Tensor | None,
-    pixel_weights: Sequence[Tensor],
     seed: int,
 ) -> tuple[Tensor, Tensor]:
     """`find_lobes` by some of the views."""
     views = searched_views(len(scene.models))
     everywhere = torch.arange(len(surfels), device=surfels.centers.device)
-    some, images = scene.of_views(views), [problem.images[v] for v in views]
+    some, images, weights = scene.of_views(views), photographs.images, photographs.weights()
     light = some.highlights(everywhere, None if indirect is None else indirect[views])
-    whole = GlossProblem.build(surfels, some.models, images, everywhere)
-    return find_lobes(surfels, whole, light, [pixel_weights[v] for v in views], seed)
+    whole = GlossProblem.build(surfels, some.models, [images[v] for v in views], everywhere)
+    return find_lobes(surfels, whole, light, [weights[v] for v in views], seed)
 
 
 def render_gloss(scene: GlossScene, surfels: Surfels) -> GlossFit:
@@ -163,18 +164,17 @@ def _solve(
     scene: GlossScene,
     problem: GlossProblem,
     at: Reflection,
-    pixels: tuple[Sequence[Tensor], Sequence[Tensor]],
+    photographs: Photographs,
     rounds: int,
 ) -> Reflection:
-    """`pixels` are the levels of views and the weights of their pixels."""
     flat, bounces, mixing = scene.highlights(problem.chosen), scene.bounces(problem.chosen), Mixing(DAMPING)
-    known, (scales, pixel_weights) = bool((at.specular > 0.0).any()), pixels
+    known, unjudged = bool((at.specular > 0.0).any()), photographs.weights()
     for index in progress_bar(range(rounds), "gloss", unit="round"):
         light = scene.light(bounces, flat, at)
-        weights = pixel_weights
+        weights = unjudged
         if known or index > 1:
             # Not before lobes stand: without them highlights are what fits badly.
-            weights = robust_weights(problem.images, scales, pixel_weights, problem.images_of(light, at))
+            weights = photographs.robust_weights(problem.images_of(light, at))
         found = problem.step(light, at, weights, exponents=known or index > 0)
         albedo = mixing.next(at.albedo, found.albedo).clamp(*ALBEDO_RANGE)
         specular = torch.minimum(found.specular, 1.0 - albedo[problem.chosen])

@@ -28,8 +28,8 @@ from rgspipe.renderer.pixel_direct import PixelDirect, surfel_transmittance
 from rgspipe.renderer.transport import PatchTransport
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.lights import PointLight
-from rgspipe.training.albedo import pixel_weight
 from rgspipe.training.levels import peak
+from rgspipe.training.photographs import relative, trusted
 
 #: Steps of a light; each at most so long, in scene sizes and in log-intensity.
 STEPS, LONGEST, STRONGEST = 4, 0.03, 0.2
@@ -96,7 +96,8 @@ class _OneLight:
         centers = bvh.surfels.centers
         self.size = float((centers.amax(dim=0) - centers.amin(dim=0)).amax())
         self.start = self.seen(PointLight(view.light.position.double(), view.light.intensity.double()))
-        trust = torch.where(weight.edges, torch.zeros(()), pixel_weight(view, weight.coverage, peak(self.image)))
+        inside = torch.where(weight.edges, torch.zeros(()), trusted(view, weight.coverage))
+        trust = inside * relative(self.start.image, peak(self.image))
         self.weights = self._robust(trust) if bool((trust > 0.0).any()) else trust
 
     def refined(self) -> PointLight:
