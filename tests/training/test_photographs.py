@@ -24,8 +24,8 @@ def test_a_view_that_fits_badly_as_a_whole_weighs_less() -> None:
     """One of nine that is wrong all over, as where something unseen shades its lamp: its own pixels are all alike."""
     photographs = photographs_of([image(1.0)] * 8 + [image(1e-3)])
     weights = photographs.robust_weights([image(1.0 + 0.01 * k) for k in range(1, 9)] + [image(1.0)])
-    # Measured 0.004 of the others.
-    assert float(weights[-1].mean()) < 1e-2 * float(weights[0].mean())
+    # Measured 2e-4 of the others.
+    assert float(weights[-1].mean()) < 1e-3 * float(weights[0].mean())
 
 
 def test_the_noise_of_a_path_tracer_makes_nothing_darker() -> None:
@@ -36,7 +36,8 @@ def test_the_noise_of_a_path_tracer_makes_nothing_darker() -> None:
     photographs = photographs_of([noisy])
     weights = photographs.robust_weights([image(1.0)])[0][:, None]
     found = float((weights * noisy).sum() / (3.0 * weights.sum()))
-    assert abs(found / float(noisy.mean()) - 1.0) < 0.01
+    # Measured 2e-4; 0.06 if each pixel is judged and weighed by its own value.
+    assert abs(found / float(noisy.mean()) - 1.0) < 2e-3
 
 
 def test_a_shadow_that_the_model_lacks_weighs_less() -> None:
@@ -47,7 +48,8 @@ def test_a_shadow_that_the_model_lacks_weighs_less() -> None:
     photograph *= 1.0 + 0.05 * torch.randn(photograph.shape, generator=generator)
     weights = photographs_of([photograph.reshape(-1, 3)]).robust_weights([image(1.0)])[0].reshape(SIZE)
     inside, outside = weights[11:21, 11:21], weights[24:, 24:]
-    assert float(inside.mean()) < 0.01 * float(outside.mean())
+    # Measured 1.5e-5.
+    assert float(inside.mean()) < 1e-3 * float(outside.mean())
 
 
 def test_pixels_that_do_not_count_do_not_judge_their_neighbours() -> None:
