@@ -62,18 +62,23 @@ class Photographs:
 
     def robust_weights(self, renders: Sequence[Tensor]) -> list[Tensor]:
         """Weights with those that fit badly weighing less: places in a view (shadow edges, occlusions), and views as a
-        whole (a lamp that something unseen shades)."""
-        errors = [self._errors(v, render) for v, render in enumerate(renders)]
-        typical = [_typical(error[trust > 0]) for error, trust in zip(errors, self.trust, strict=True)]
+        whole (a lamp that something unseen shades).
+
+        A pixel fits badly that is off together with those around it by more than single pixels are, which noise does.
+        """
+        pixels, places = (
+            [self._errors(v, render, around) for v, render in enumerate(renders)] for around in (0, AROUND)
+        )
+        typical = [_typical(error[trust > 0]) for error, trust in zip(pixels, self.trust, strict=True)]
         usual = _typical(torch.stack(typical)) if typical else torch.tensor(1.0)
-        parts = zip(self.weights(renders), errors, typical, strict=True)
+        parts = zip(self.weights(renders), places, typical, strict=True)
         return [weight * _less(error, own) * _less(own, usual) for weight, error, own in parts]
 
-    def _errors(self, v: int, render: Tensor) -> Tensor:
-        """(P,) by how much the means around pixels differ, over the darker: shadows that the model lacks and those that
-        it alone has count alike."""
+    def _errors(self, v: int, render: Tensor, around: int) -> Tensor:
+        """(P,) by how much means over so many pixels to each side differ, over the darker: shadows that the model lacks
+        and those that it alone has count alike."""
         both = torch.cat([render, self.images[v]], dim=1)
-        shown, told = _local_means(both, self.trust[v] > 0, self.sizes[v]).split(3, dim=1)
+        shown, told = _local_means(both, self.trust[v] > 0, self.sizes[v], around).split(3, dim=1)
         darker = torch.minimum(shown.mean(dim=1), told.mean(dim=1))
         return (shown - told).abs().mean(dim=1) / (darker + DARK * self.levels[v])
 
@@ -92,11 +97,12 @@ def relative(shown: Tensor, scale: Tensor) -> Tensor:
     return 1.0 / (shown.mean(dim=1) / scale + DARK) / scale.square()
 
 
-def _local_means(values: Tensor, counted: Tensor, size: tuple[int, int]) -> Tensor:
-    """(P, C) means of `values` over the pixels `counted` (P,) around each in an image of `size`; 0 where none is."""
+def _local_means(values: Tensor, counted: Tensor, size: tuple[int, int], around: int) -> Tensor:
+    """(P, C) means of `values` over the pixels `counted` (P,) in squares around each in an image of `size`; 0 where
+    none is."""
     share = counted.to(values)[:, None]
     stacked = torch.cat([values * share, share], dim=1).T.reshape(1, -1, *size)
-    summed = avg_pool2d(stacked, 2 * AROUND + 1, stride=1, padding=AROUND)[0].reshape(values.shape[1] + 1, -1).T
+    summed = avg_pool2d(stacked, 2 * around + 1, stride=1, padding=around)[0].reshape(values.shape[1] + 1, -1).T
     return summed[:, :-1] / summed[:, -1:].clamp(min=1e-12)
 
 
