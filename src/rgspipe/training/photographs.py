@@ -21,9 +21,9 @@ MINIMUM_COVERAGE = 0.3
 #: … and so do those whose alpha and coverage differ by more: there the surfels end where the object does not.
 COVERAGE_MISMATCH = 0.1
 
-#: Pixels to each side over which errors are averaged before they are judged. Of none, each would be judged by its own
-#: noise: that of a path tracer is a few pixels that are much too bright, and without these albedo comes out too low. Of
-#: two, shadow's edges, a pixel wide, would be hidden among what is right.
+#: Pixels to each side over which errors are averaged before they are judged. With none, each is judged by its own
+#: noise: that of a path tracer is a few pixels that are much too bright, and without these albedo comes out too low. In
+#: the room of the tests, with such noise of 60 %, it is 2.7 % too low in the mean; with one pixel 0.9 %, as with two.
 AROUND = 1
 
 
