@@ -63,3 +63,11 @@ def test_pixels_that_do_not_count_do_not_judge_their_neighbours() -> None:
     one, other = photographs.robust_weights([wrong.reshape(-1, 3), image(1.01)])
     assert torch.equal(one, other)
     assert bool((one.reshape(SIZE)[:, :20] > 0.0).all()) and bool((one.reshape(SIZE)[:, 20:] == 0.0).all())
+
+
+def test_what_noise_made_negative_counts_as_dark() -> None:
+    """At −0.1 of the level a weight without a floor would be infinite, and negative below."""
+    for value in (-0.1, -0.5, -2.0):
+        photographs = photographs_of([image(value)])
+        for weights in (photographs.weights(), photographs.robust_weights([image(0.0)])):
+            assert bool((weights[0] >= 0.0).all()) and float(weights[0].max()) <= 10.0

@@ -79,7 +79,7 @@ class Photographs:
         and those that it alone has count alike."""
         both = torch.cat([render, self.images[v]], dim=1)
         shown, told = _local_means(both, self.trust[v] > 0, self.sizes[v], around).split(3, dim=1)
-        darker = torch.minimum(shown.mean(dim=1), told.mean(dim=1))
+        darker = torch.minimum(shown.mean(dim=1), told.mean(dim=1)).clamp(min=0.0)
         return (shown - told).abs().mean(dim=1) / (darker + DARK * self.levels[v])
 
 
@@ -93,8 +93,8 @@ def trusted(view: View, coverage: Tensor) -> Tensor:
 
 def relative(shown: Tensor, scale: Tensor) -> Tensor:
     """(P,) weights of squared errors of an image that shows (P, 3), measured against the level `scale`: relative in
-    bright pixels, absolute in dark."""
-    return 1.0 / (shown.mean(dim=1) / scale + DARK) / scale.square()
+    bright pixels, absolute in dark, and in those that noise made negative."""
+    return 1.0 / (shown.mean(dim=1).clamp(min=0.0) / scale + DARK) / scale.square()
 
 
 def _local_means(values: Tensor, counted: Tensor, size: tuple[int, int], around: int) -> Tensor:
