@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import time
 import zipfile
 from collections.abc import Callable, Iterator
@@ -14,11 +15,13 @@ import torch
 from PIL import Image
 
 from lit_room import VISIBLE
+from luminaire_files import ies
 from rgspipe.evaluation.images import tone_map
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera, PointLight
 from rgspipe.scene.lights import KINDS
 from rgspipe.viewer.lamp_controls import ARMS
+from rgspipe.viewer.lamp_fields import CHOSEN
 from rgspipe.viewer.lamp_numbers import RGB, numbers_of
 from rgspipe.viewer.material import Photograph
 from rgspipe.viewer.page import Page
@@ -189,7 +192,7 @@ def test_keys_do_what_buttons_do(window, page: Page) -> None:
     window.mouse.click(20, 450)
     window.keyboard.press("n")
     until(lambda: len(session.lights) == 2)
-    for kind in ("spot", "sphere", "panel"):
+    for kind in [*KINDS][1:]:
         window.keyboard.press("k")
         until(lambda kind=kind: session.lights[1].kind == kind)
     window.keyboard.press("x")
@@ -244,18 +247,40 @@ def test_keys_change_every_number_of_a_lamp(window, page: Page) -> None:
 VALUES = "() => [...document.querySelectorAll('input')].map(field => field.value)"
 
 
-def test_a_lamp_of_a_kind_that_is_not_offered_has_its_own_and_can_be_made_a_point(window, page: Page) -> None:
+def test_lamps_of_every_kind_are_made_with_the_fields_of_their_own_numbers(window, page: Page) -> None:
     session = page.session
-    for kind in ("led", "sun"):
-        session.change([KINDS[kind].shaped().at(LAMP.position, torch.tensor([0.6, 0.0, -0.8]), LAMP.intensity)])
-        page.actions.do("refresh", page.lamps.refresh).result()
+    for kind in [*[*KINDS][1:], "point"]:
         # All at once, as fields come and go with the kind.
-        until(lambda kind=kind: kind in window.evaluate(VALUES))
-        window.locator("input").nth(window.evaluate(VALUES).index(kind)).click()
-        window.get_by_role("option", name="point", exact=True).click()
-        until(lambda: session.lights[0].kind == "point")
+        until(lambda: session.lights[0].kind in window.evaluate(VALUES))
+        window.locator("input").nth(window.evaluate(VALUES).index(session.lights[0].kind)).click()
+        window.get_by_role("option", name=kind, exact=True).click()
+        until(lambda kind=kind: session.lights[0].kind == kind)
+        labels = [one.label for one in numbers_of(session.lights[0], session.images.frozen.size)]
+        for label in ("exponent", "radius", "heading °", "turn °", "W/sr", "W/unit²"):
+            field, is_there = window.get_by_text(re.compile(f"^({CHOSEN})?{label}$")), label in labels
+            until(lambda field=field, is_there=is_there: field.is_visible() == is_there)
     session.change([LAMP])
     page.actions.do("refresh", page.lamps.refresh).result()
+
+
+def test_a_luminaire_s_file_is_opened(window, page: Page) -> None:
+    session, button = page.session, window.get_by_role("button", name="luminaire file")
+    session.as_kind(0, "profile")
+    page.actions.do("refresh", page.lamps.refresh).result()
+    window.get_by_text("Luminaire: none").wait_for()
+    for name, content in (("broken.ies", b"nothing"), ("office.ies", ies().encode())):
+        with window.expect_file_chooser() as chooser:
+            button.focus()
+            window.keyboard.press("Enter")
+        chooser.value.set_files({"name": name, "mimeType": "text/plain", "buffer": content})
+        window.get_by_text("a line TILT" if name == "broken.ies" else "Luminaire: office.ies").wait_for()
+    assert session.lights[0].label == "profile office.ies"
+    expected = session.images.frozen.render(CAMERA, session.lights)
+    # Measured 0.
+    assert (session.image(CAMERA) - expected).abs().max() <= 1e-5 * expected.max()
+    session.change([LAMP])
+    page.actions.do("refresh", page.lamps.refresh).result()
+    button.wait_for(state="hidden")
 
 
 def _told(label: str) -> str:

@@ -8,7 +8,6 @@ import torch
 from rgspipe.scene import PointLight
 from rgspipe.scene.lights import KINDS, Light
 from rgspipe.viewer.lamp_numbers import RGB, Number, colour_of, level_of, numbers_of, with_colour
-from rgspipe.viewer.session import OFFERED
 
 #: Aimed along none of the axes, and of a colour with three different channels.
 PLACE, AXIS, COLOUR = [0.1, -0.2, 0.3], [0.48, 0.64, -0.6], [0.51, 0.6, 0.33]
@@ -18,7 +17,7 @@ def lamp(kind: str) -> Light:
     return KINDS[kind].shaped().at(*(torch.tensor(x, dtype=torch.float64) for x in (PLACE, AXIS, COLOUR)))
 
 
-CASES = [(kind, one.label) for kind in (*OFFERED, "led", "sun") for one in numbers_of(lamp(kind), 1.0)]
+CASES = [(kind, one.label) for kind in KINDS for one in numbers_of(lamp(kind), 1.0)]
 
 
 def named(light: Light, label: str) -> Number:
@@ -54,6 +53,16 @@ def test_colour_and_level_are_apart() -> None:
     out = named(light, "W/sr").with_value(light, 0.0)
     assert level_of(out) == 0.0 and colour_of(out) == (255, 255, 255)
     assert level_of(named(out, "W/sr").with_value(out, 2.0)) == 2.0
+
+
+def test_a_step_is_a_part_of_lengths_by_the_scene_and_of_all_else_by_its_value() -> None:
+    """The exponent of an LED is no length: in a room of 400 units a key changed it by 4."""
+    led, sphere = KINDS["led"].shaped(8.0), KINDS["sphere"].shaped(1.0)
+    steps = [
+        next(one for one in numbers_of(light, 400.0) if one.label == label).step
+        for light, label in ((led, "exponent"), (sphere, "radius"))
+    ]
+    assert steps == pytest.approx([0.8, 4.0])
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 400.0])

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from lit_room import VISIBLE, room_cameras
+from luminaire_files import photometry
 from open_room import TINT, frozen_open_room, open_room_cameras
 from rgspipe.datasets.light_file import read_ambient, read_lights
 from rgspipe.fitting.alternative import Alternative
@@ -21,16 +22,9 @@ from rgspipe.scene.lights import KINDS
 from rgspipe.scene.surfels import Gloss
 from rgspipe.viewer.lamp_images import LampImages
 from rgspipe.viewer.material import Case, Found, Photograph
-from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, OFFERED, Session, kinds_for, same_lights
+from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, Session, same_lights
 
 LAMP = PointLight(list(VISIBLE), [0.6, 0.5, 0.4])
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_lamp_can_be_of_its_own_kind_and_of_those_that_are_offered(kind: str) -> None:
-    kinds = kinds_for(KINDS[kind].shaped())
-    assert set(kinds) == {*OFFERED, kind}
-    assert len(kinds) == len(set(kinds))
 
 
 @pytest.fixture
@@ -38,7 +32,7 @@ def session(frozen: FrozenScene) -> Session:
     return Session(LampImages(frozen), (LAMP,))
 
 
-@pytest.mark.parametrize("kind", OFFERED)
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_picture_is_that_of_the_scene_under_all_lamps(session: Session, kind: str) -> None:
     camera = room_cameras(32)[0]
     index = session.add(kind)
@@ -101,6 +95,52 @@ def test_lamps_come_go_and_change_their_kind(session: Session) -> None:
     session.remove(1)
     session.undo()
     assert len(session.lights) == 2
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_lamp_is_as_bright_half_the_scene_away_as_that_which_it_was_made_of(session: Session, kind: str) -> None:
+    size, aim = session.images.frozen.size, torch.tensor([0.6, 0.0, 0.8]).double()
+    session.as_kind(0, kind, aim)
+    light = session.lights[0]
+    reach = 1.0 if light.distant else (0.5 * size) ** -2
+    torch.testing.assert_close(reach * light.intensity, (0.5 * size) ** -2 * LAMP.intensity)
+    assert light.axis is None or torch.equal(light.axis, aim)
+    # An axis is kept, but not between a lamp in the room and a sun, which is to shine in through openings.
+    for other in KINDS:
+        session.replace(0, light)
+        session.as_kind(0, other, -aim)
+        made = session.lights[0]
+        kept = light.axis is not None and light.distant == made.distant
+        assert made.axis is None or torch.equal(made.axis, aim if kept else -aim)
+        torch.testing.assert_close(
+            made.intensity * (1.0 if made.distant else (0.5 * size) ** -2), reach * light.intensity
+        )
+
+
+def test_lamps_that_are_added_beside_a_sun_are_as_bright(session: Session) -> None:
+    size = session.images.frozen.size
+    session.as_kind(0, "sun")
+    session.add()
+    torch.testing.assert_close(session.lights[1].intensity, LAMP.intensity.mean().expand(3))
+    session.change(())
+    session.add("sun")
+    assert float(session.lights[0].intensity[0]) == pytest.approx(2.0)
+    session.as_kind(0, "point")
+    assert float(session.lights[0].intensity[0]) == pytest.approx(0.5 * size**2)
+
+
+def test_a_lamp_that_is_made_another_and_back_has_its_shape(session: Session) -> None:
+    table = photometry(name="office.ies")
+    session.as_kind(0, "profile")
+    session.as_luminaire(0, table)
+    session.as_kind(0, "point")
+    session.as_kind(0, "profile")
+    assert session.lights[0].label == "profile office.ies"
+    session.forget()
+    session.add()
+    session.as_kind(1, "profile")
+    assert session.lights[1].table is table
+    assert not torch.equal(session.lights[1].position, session.lights[0].position)
 
 
 def test_without_lamps_it_is_dark(frozen: FrozenScene) -> None:

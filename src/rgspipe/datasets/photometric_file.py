@@ -45,13 +45,29 @@ def read_photometry(path: str | Path) -> Photometry:
         InputError: missing, too large, no such file, or something in it that cannot be.
     """
     path = as_path(path)
+    _reader(path)
+    limit = reading_limits().text_bytes
+    return photometry_of(input_file(path, "a measured luminaire", most_bytes=limit).read_bytes(), path)
+
+
+def photometry_of(content: bytes, path: Path) -> Photometry:
+    """The table of a luminaire whose file, with this content, is or was `path`.
+
+    Raises:
+        InputError: too large, no such file, or something in it that cannot be.
+    """
+    reader, limit = _reader(path), reading_limits().text_bytes
+    if len(content) > limit:
+        _refuse(path, f"a measured luminaire of at most {limit} bytes", f"{len(content)} bytes", "Check the file.")
+    text = content.decode("latin-1")
+    return reader(_Source(path, text.removeprefix("ï»¿").replace("\r\n", "\n").replace("\r", "\n")))
+
+
+def _reader(path: Path) -> Callable[[_Source], Photometry]:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         _refuse(path, " or ".join(READERS), path.suffix or "no ending", "Name a measured luminaire's file.")
-    text = (
-        input_file(path, "a measured luminaire", most_bytes=reading_limits().text_bytes).read_bytes().decode("latin-1")
-    )
-    return reader(_Source(path, text.removeprefix("ï»¿").replace("\r\n", "\n").replace("\r", "\n")))
+    return reader
 
 
 def read_catalogue(folder: str | Path) -> dict[str, Photometry]:

@@ -72,6 +72,15 @@ class Actions:
 
         field.on_update(changed)
 
+    def file(self, button: viser.GuiUploadButtonHandle, take: Callable[[viser.UploadedFile], None]) -> None:
+        """What is done with a file that the visitor opens with a button."""
+
+        async def opened(_: object) -> None:
+            file = button.value
+            self.do(button.label, lambda: take(file))
+
+        button.on_upload(opened)
+
     def do(self, name: str, run: Callable[[], None]) -> Future:
         """Do something after all that was asked for before; what cannot be done is told in a note."""
         return self._put(self._queue, lambda: self._told(name, run))

@@ -9,16 +9,21 @@ import numpy as np
 import torch
 
 from rgspipe.scene import Camera
-from rgspipe.scene.lights import Light
+from rgspipe.scene.lights import KINDS, Light
 from rgspipe.viewer.actions import Action
 from rgspipe.viewer.cameras import axis_of, turned_to
 from rgspipe.viewer.lamp_fields import LampFields
+from rgspipe.viewer.lamp_kinds import HELP
 from rgspipe.viewer.lamp_numbers import colour_of
-from rgspipe.viewer.session import kinds_for
+from rgspipe.viewer.luminaires import Luminaires
+from rgspipe.viewer.session import DOWN
 from rgspipe.viewer.visit import Visit
 
 #: Length of a gizmo's arms and radius of the ball in it, of the scene's size.
 ARMS, BALL = 0.12, 0.012
+
+#: Colour of the line along which a lamp with an axis shines.
+AIM = (255, 220, 60)
 
 
 class LampControls:
@@ -26,7 +31,8 @@ class LampControls:
 
     def __init__(self, visit: Visit) -> None:
         self._client, self._session, self._changed = visit.client, visit.session, visit.changed
-        self._actions, session, gui = visit.actions, visit.session, visit.client.gui
+        self._actions, self._camera = visit.actions, visit.camera
+        session, gui = visit.session, visit.client.gui
         self._chosen, self._gizmos = 0, []
         self._eye: Camera | None = None
         self._which = gui.add_dropdown("lamp", ["none"], hint="The lamp that the fields below are about. Key T.")
@@ -41,12 +47,11 @@ class LampControls:
             Action("next kind", "K", "Make the chosen lamp one of the next kind.", self._next_kind),
         )
         visit.actions.keys(*further)
-        self._kind = gui.add_dropdown(
-            "kind", kinds_for(None), hint="Point, spot, sphere or panel, at the same place. Key K."
-        )
+        self._kind = gui.add_dropdown("kind", [*KINDS], hint=f"{HELP} Key K.")
+        self._luminaires = Luminaires(visit, lambda table: self._with(session.as_luminaire, table))
         self._fields = LampFields(gui, visit.actions, session.images.frozen.size, self._edited)
         visit.actions.field(self._which, self._choose)
-        visit.actions.field(self._kind, lambda: self._with(session.as_kind, self._kind.value))
+        visit.actions.field(self._kind, lambda: self._make(self._kind.value))
         self.refresh()
 
     def add(self) -> None:
@@ -89,12 +94,17 @@ class LampControls:
         gizmo = scene.add_transform_controls(
             f"/lamps/{index}",
             scale=ARMS * size,
+            disable_axes=light.distant,
+            disable_sliders=light.distant,
             disable_rotations=light.axis is None,
             depth_test=False,
             position=tuple(light.position.tolist()),
             wxyz=_turn(light),
         )
         scene.add_icosphere(f"/lamps/{index}/ball", radius=BALL * size, color=colour_of(light))
+        if light.axis is not None:
+            aim = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, -ARMS * size]]])
+            scene.add_line_segments(f"/lamps/{index}/aim", aim, AIM, thickness=3.0, thickness_units="screen")
 
         async def dragged(event: Any) -> None:
             phase = event.phase
@@ -120,10 +130,9 @@ class LampControls:
         lights = self._session.lights
         self._kind.disabled = not lights
         light = lights[self._chosen] if lights else None
-        if [*self._kind.options] != kinds_for(light):
-            self._kind.options = kinds_for(light)
         if light is not None:
             self._kind.value = light.kind
+        self._luminaires.show(light)
         self._fields.show(light)
 
     def _edited(self, light: Light, what: str) -> None:
@@ -144,9 +153,13 @@ class LampControls:
 
     def _next_kind(self) -> None:
         if lights := self._session.lights:
-            light = lights[self._chosen]
-            kinds = kinds_for(light)
-            self._with(self._session.as_kind, kinds[(kinds.index(light.kind) + 1) % len(kinds)])
+            kinds = [*KINDS]
+            self._make(kinds[(kinds.index(lights[self._chosen].kind) + 1) % len(kinds)])
+
+    def _make(self, kind: str) -> None:
+        """Another kind; a sun shines the way that the visitor looks, as that leads through openings."""
+        eye = self._camera() if KINDS[kind].distant else None
+        self._with(self._session.as_kind, kind, DOWN if eye is None else -eye.camera_to_world[:3, 2])
 
     def _with(self, action: Callable[..., None], *given: Any) -> None:
         if self._session.lights:

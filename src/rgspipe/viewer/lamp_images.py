@@ -10,7 +10,7 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from rgspipe.renderer.ambient import ambient_radiance
+from rgspipe.renderer.ambient import ambient_radiance, lets_light_in
 from rgspipe.renderer.effects import ALL_EFFECTS
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.model import Lit, SurfelModel, ViewModel
@@ -88,6 +88,12 @@ class LampImages:
         if ambient is not None and self._void_lit is not None:
             arriving += ambient.to(albedo) * self._arriving(VOID, self._void_lit, self._direct_void)
         return (model.views.operator @ arriving).reshape(camera.height, camera.width, 3).cpu()
+
+    @cached_property
+    def lets_light_in(self) -> bool:
+        """Whether anything from outside reaches the scene."""
+        with torch.no_grad():
+            return lets_light_in(self.frozen)
 
     @cached_property
     def _void_lit(self) -> Tensor | None:

@@ -12,9 +12,10 @@ from torch import Tensor
 
 from rgspipe.fitting.result_text import decimals_of
 from rgspipe.scene.lights import Light
+from rgspipe.scene.lights.shape_coordinates import Length
 from rgspipe.scene.lights.shape_number import ShapeNumber
 
-#: Of lengths, a part of the scene's size; of levels and colours, a part of the value and of full; of angles, degrees.
+#: Of lengths, a part of the scene's size; of colours, of full; of angles, degrees; of all else a part of the value.
 STEP, SHARE, TURN = 0.01, 0.1, 2.0
 
 #: Digits that are shown of a length of the scene's size, and of a level.
@@ -61,11 +62,12 @@ def numbers_of(light: Light, size: float) -> list[Number]:
         ]
     numbers += [_channel(index) for index in range(3)]
     level = level_of(light)
-    hint = "Intensity of the brightest channel."
+    told = "Irradiance across it" if light.distant else "Intensity"
+    hint = f"{told} of the brightest channel."
     numbers.append(
         Number(light.unit, hint, level_of, _levelled, SHARE * (level or 1.0), decimals_of(level or 1.0, DIGITS))
     )
-    return numbers + [_shape(number, size, decimals) for number in light.shape]
+    return numbers + [_shape(number, light, size) for number in light.shape]
 
 
 def level_of(light: Light) -> float:
@@ -115,15 +117,23 @@ def _channel(index: int) -> Number:
     return Number(RGB[index], hint, lambda light: FULL * float(_hue(light)[index]), changed, SHARE * FULL, 0)
 
 
-def _shape(number: ShapeNumber, size: float, decimals: int) -> Number:
+def _shape(number: ShapeNumber, light: Light, size: float) -> Number:
     def changed(light: Light, value: float) -> Light:
         return light.changed(number.name, number.natural(value))
 
-    name, angle = number.name.replace("_", " "), number.unit == "°"
-    hint = f"The lamp's {name}{' in degrees' if angle else ''}."
-    step = TURN if angle else _rounded(STEP * size)
-    label = f"{name} {number.unit}".strip()
-    return Number(label, hint, partial(_shown, number), changed, step, 1 if angle else decimals)
+    name = number.name.replace("_", " ")
+    step, decimals = _steps(number, _shown(number, light), size)
+    hint = f"The lamp's {name}{' in degrees' if number.unit == '°' else ''}."
+    return Number(f"{name} {number.unit}".strip(), hint, partial(_shown, number), changed, step, decimals)
+
+
+def _steps(number: ShapeNumber, value: float, size: float) -> tuple[float, int]:
+    """By which a key changes a number of a shape, and with how many decimals it is shown."""
+    if number.unit == "°":
+        return TURN, 1
+    if isinstance(number.coordinate, Length):
+        return _rounded(STEP * size), decimals_of(size, DIGITS)
+    return _rounded(SHARE * (value or 1.0)), decimals_of(value or 1.0, DIGITS)
 
 
 def _shown(number: ShapeNumber, light: Light) -> float:

@@ -16,14 +16,12 @@ from rgspipe.evaluation.images import Bytes, beside, display_gain, save_png, sig
 from rgspipe.fitting import FitResult
 from rgspipe.light_export.world import LUMENS_PER_WATT, LUMINANCE
 from rgspipe.scene import Camera, LightRig
-from rgspipe.scene.lights import KINDS, Light
+from rgspipe.scene.lights import Light, Photometry
 from rgspipe.viewer.false_colour import coloured
 from rgspipe.viewer.lamp_images import LampImages, Quality
+from rgspipe.viewer.lamp_kinds import in_place_of, irradiance, made
 from rgspipe.viewer.material import Case, Found, Photograph
 from rgspipe.viewer.section import CutCamera
-
-#: Kinds of lamps that are offered.
-OFFERED = ("point", "spot", "sphere", "panel")
 
 #: What pictures show: radiance as a photograph, or what arrives on surfaces in false colours.
 PICTURE, IRRADIANCE, ILLUMINANCE = "picture", "irradiance, W/m²", "illuminance, lux"
@@ -37,6 +35,9 @@ GAP = 0.1
 
 #: Steps that can be undone.
 STEPS = 100
+
+#: Where lamps shine that had no axis.
+DOWN = torch.tensor([0.0, 0.0, -1.0], dtype=torch.float64)
 
 
 @dataclass
@@ -69,6 +70,7 @@ class Session:
     _gain: float | None = None
     _past: list[LightRig] = field(default_factory=list)
     _gesture: str | None = None
+    _shapes: dict[str, Light] = field(default_factory=dict)
 
     def change(self, lights: Sequence[Light], gesture: str | None = None) -> None:
         """Take other lamps. Changes in a row with one `gesture`, as of a drag, are undone together."""
@@ -103,9 +105,10 @@ class Session:
         above = torch.stack([middle[0], middle[1], middle[2] + 0.25 * (upper[2] - lower[2])])
         size = max(self.images.frozen.size, 1e-6)
         position = next(place for place in _around(above, GAP * size) if self._is_free(place, 0.5 * GAP * size))
-        level = [float(light.intensity.mean()) for light in self.lights] or [0.5 * size**2]
-        intensity = torch.full((3,), sum(level) / len(level), dtype=torch.float64)
-        self.change([*self.lights, _of_kind(kind, position, intensity, None, size)])
+        level = [irradiance(light, size) * float(light.intensity.mean()) for light in self.lights] or [2.0]
+        lamp = made(kind, size)
+        intensity = torch.full((3,), sum(level) / len(level) / irradiance(lamp, size), dtype=torch.float64)
+        self.change([*self.lights, lamp.at(position, DOWN, intensity)])
         return len(self.lights) - 1
 
     def _is_free(self, place: Tensor, distance: float) -> bool:
@@ -115,12 +118,21 @@ class Session:
         """Take a lamp away."""
         self.change([*self.lights[:index], *self.lights[index + 1 :]])
 
-    def as_kind(self, index: int, kind: str) -> None:
-        """Make a lamp one of another kind, at its place, of its intensity and direction."""
-        light = self.lights[index]
-        self.replace(
-            index, _of_kind(kind, light.position, light.intensity, light.axis, max(self.images.frozen.size, 1e-6))
-        )
+    def as_kind(self, index: int, kind: str, aim: Tensor = DOWN) -> None:
+        """Make a lamp one of another kind, of the shape of one that was or is there, if any.
+
+        Args:
+            aim: see `in_place_of`.
+        """
+        light, size = self.lights[index], max(self.images.frozen.size, 1e-6)
+        self._shapes[light.kind] = light
+        there = (one for one in self.lights if one.kind == kind)
+        model = self._shapes.get(kind) or next(there, None) or made(kind, size)
+        self.replace(index, in_place_of(light, model, size, aim))
+
+    def as_luminaire(self, index: int, table: Photometry) -> None:
+        """Make a lamp whose shape is a table's a measured luminaire."""
+        self.replace(index, self.lights[index].with_tables(table))
 
     def seen(self, camera: Camera) -> Camera:
         """A camera with the section before it."""
@@ -211,11 +223,6 @@ class Session:
         save_png(path, self.picture(self.seen(camera))[0])
 
 
-def kinds_for(light: Light | None) -> list[str]:
-    """Kinds that a lamp can be made: those that are offered, and its own."""
-    return list(OFFERED if light is None else dict.fromkeys((*OFFERED, light.kind)))
-
-
 def same_lights(one: LightRig, other: LightRig) -> bool:
     """Whether two rigs shine alike."""
     return len(one) == len(other) and all(_fields(a) == _fields(b) for a, b in zip(one, other, strict=True))
@@ -237,10 +244,3 @@ def _around(middle: Tensor, gap: float) -> Iterator[Tensor]:
     for number in itertools.count():
         angle, radius = number * math.pi * (3.0 - math.sqrt(5.0)), gap * math.sqrt(number)
         yield middle + torch.tensor([radius * math.cos(angle), radius * math.sin(angle), 0.0], dtype=torch.float64)
-
-
-def _of_kind(kind: str, position: Tensor, intensity: Tensor, axis: Tensor | None, size: float) -> Light:
-    """A lamp; one that has an extent begins with the smaller of those that a fit tries."""
-    light = KINDS[kind].shaped().at(position, axis, intensity)
-    grown = light.grown(size, free=True)
-    return grown[0]
