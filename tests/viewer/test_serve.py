@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 import torch
 
@@ -100,6 +101,22 @@ def test_images_are_shown_whose_lamps_are_to_be_found(frozen: FrozenScene) -> No
     assert len(session.case.photographs) == 1 and session.found is None and session.lights == (lamp,)
 
 
+def test_masks_and_lamps_in_sight_are_given_as_fits_take_them(frozen: FrozenScene) -> None:
+    cameras, lamp = room_cameras(24), rg.PointLight(list(VISIBLE), 0.5)
+    images, masks = [frozen.render(camera, lamp) for camera in cameras], [torch.full((24, 24), 0.5)] * 2
+    own = np.zeros((2, 24, 24), dtype=bool)
+    own[0, 3, 4] = True
+    shown = rg.view(frozen, cameras=cameras, images=images, masks=masks, emitters=own, port=0)
+    shown.stop()
+    for taken, mask, emitters in zip(shown._exhibit.session().case.photographs, masks, own, strict=True):
+        assert torch.equal(taken.mask, mask)
+        assert np.array_equal(taken.emitters.numpy(), emitters)
+    for emitters, looks_out in (("auto", True), (None, False)):
+        shown = rg.view(frozen, emitters=emitters, port=0)
+        shown.stop()
+        assert shown._exhibit.finder._looks_out is looks_out
+
+
 def test_what_a_fit_left_open_is_looked_for_again(frozen: FrozenScene) -> None:
     found = replace(dark_result(1.0), lights=(rg.PointLight(list(VISIBLE), 0.5),), exposures=(1.0, 2.0))
     shown = rg.view(frozen, fit=found, port=0)
@@ -119,6 +136,12 @@ def test_what_a_fit_left_open_is_looked_for_again(frozen: FrozenScene) -> None:
             {"cameras": room_cameras(8)[0], "images": torch.ones(8, 9, 3)},
             "images[0]: expected numbers of shape (8, 8, 3)",
         ),
+        ({"masks": torch.ones(8, 8)}, "masks: expected one for each camera (0), found 1 of them"),
+        (
+            {"cameras": room_cameras(8)[0], "images": torch.ones(8, 8, 3), "masks": 255 * torch.ones(8, 8)},
+            "masks[0]: expected values from 0 to 1, found values from 255 to 255",
+        ),
+        ({"emitters": "all"}, 'emitters: expected "auto", masks or None'),
     ],
 )
 def test_what_cannot_be_shown_is_refused(frozen: FrozenScene, given: dict[str, Any], found: str) -> None:

@@ -86,6 +86,7 @@ def _serve(made: _Made) -> int:
         exposure_free=config.fit.exposure == "free",
         base_scale_free=config.fit.base_scale == "free",
         ambient=config.light.ambient,
+        emitters="auto" if config.fit.emitters == "auto" else None,
     )
     return serve(viewer, page.port, page.browser)
 

@@ -11,7 +11,6 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from rgspipe.arguments import as_one_of
 from rgspipe.datasets.alternatives_file import ToldAlternative, read_alternatives
 from rgspipe.datasets.covariance_file import read_covariances
 from rgspipe.datasets.gs3 import load_target
@@ -25,7 +24,6 @@ from rgspipe.fitting.model.capture import SATURATED, ImageCapture
 from rgspipe.fitting.result_text import as_text, headline, light_lines
 from rgspipe.fitting.words import told_alternative
 from rgspipe.scene import Camera, LightRig
-from rgspipe.scene.arrays import ArrayLike, as_list, as_tensor, check_finite, check_levels
 
 #: Of photographs of which only some are known with the lamps off.
 HALF_KNOWN = "Lamps cannot be looked for here: only some of the photographs are there with the lamps off, too."
@@ -41,6 +39,7 @@ class Photograph:
         base: (H, W, 3) the same with the lamps off; black if None.
         clip: radiance at which the image is clipped; inf where it is not.
         saturated: a value from here on, as a part of the clip, tells only that the scene is at least so bright.
+        emitters: (H, W) 1 where it shows lamps themselves, which searches leave out; None where nobody said so.
     """
 
     name: str
@@ -51,6 +50,7 @@ class Photograph:
     base: Tensor | None = None
     clip: float = math.inf
     saturated: float = SATURATED
+    emitters: Tensor | None = None
 
     @classmethod
     def of(cls, view: View, name: str) -> Photograph:
@@ -59,7 +59,8 @@ class Photograph:
         if view.base is not None and view.saturated_from is not None:
             saturated = saturated | (view.base >= view.saturated_from)
         mask = torch.where(saturated.any(dim=-1), 0.0, view.alpha)
-        return cls(name, view.camera, view.image, mask, None if view.light is None else (view.light,), view.base)
+        lights = None if view.light is None else (view.light,)
+        return cls(name, view.camera, view.image, mask, lights, view.base, emitters=view.emitters)
 
     def explained(self, seen: Tensor) -> Tensor:
         """(H, W, 3) `seen` as it would have been photographed: what is saturated hides how much brighter it is."""
@@ -146,29 +147,6 @@ class Case:
             known = capture.saturated
             views = [replace(one, mask=view.alpha, clip=clip, saturated=known) for one, view, clip in limits]
         return cls(target.name, views, truth, found)
-
-
-def as_photographs(cameras: Camera | Sequence[Camera], images: Sequence[ArrayLike] | ArrayLike) -> list[Photograph]:
-    """Photographs of cameras and their images (H, W, 3) of linear radiance; one stands for a list of it.
-
-    Raises:
-        InputError: there are not as many images as cameras, or an image does not fit its camera.
-    """
-    cameras, images = [cameras] if isinstance(cameras, Camera) else list(cameras), as_list(images, axes=3)
-    if len(cameras) != len(images):
-        expected, remedy = f"one for each camera ({len(cameras)})", "Pass both as rg.fit_lights took them."
-        raise InputError("images", expected=expected, found=f"{len(images)} of them", remedy=remedy)
-    pairs = enumerate(zip(cameras, images, strict=True))
-    return [_photograph(index, camera, image) for index, (camera, image) in pairs]
-
-
-def _photograph(index: int, camera: Camera, image: ArrayLike) -> Photograph:
-    camera = as_one_of(camera, Camera, f"cameras[{index}]", "Camera.look_at makes one.")
-    where, size = f"images[{index}]", (camera.height, camera.width, 3)
-    check_levels(where, image)
-    radiance = as_tensor(image, where, size, torch.float32)
-    check_finite(radiance, where, "Make it again.")
-    return Photograph(f"view {index}", camera, radiance.detach().cpu())
 
 
 def case_in(

@@ -18,14 +18,16 @@ import torch
 from rgspipe.arguments import as_one_of
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitResult
+from rgspipe.fitting.fit import Emitters
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera
 from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.lights import Light, as_rig
 from rgspipe.viewer.cameras import first_camera, pose_of
+from rgspipe.viewer.given import Masks, as_photographs
 from rgspipe.viewer.lamp_images import LampImages
-from rgspipe.viewer.material import Case, Found, Photograph, as_photographs
+from rgspipe.viewer.material import Case, Found, Photograph
 from rgspipe.viewer.search import Finder
 from rgspipe.viewer.visit import Exhibit
 
@@ -160,6 +162,8 @@ def view(
     fit: FitResult | None = None,
     cameras: Camera | Sequence[Camera] = (),
     images: Sequence[ArrayLike] | ArrayLike = (),
+    masks: Masks = None,
+    emitters: Emitters = "auto",
     camera: Camera | None = None,
     cases: Sequence[Case] = (),
     references: Sequence[Photograph] = (),
@@ -182,6 +186,9 @@ def view(
         fit: what `fit_lights` found. What it left open besides lamps is left open in searches of the page, too.
         cameras: of `images`; one stands for a list of it.
         images: (H, W, 3) linear radiance per camera, under lamps that `fit` found or that are to be found on the page.
+        masks: (H, W) per camera, the scene's share of each pixel; 1 if None.
+        emitters: what is known of lamps that images show: "auto" and None as `fit_lights` takes them, for photographs
+            of `cases`, too, that say nothing of it; (H, W) masks per camera that are 1 there.
         camera: of the first picture; in front of the scene if None.
         cases: further sets of such photographs, with truth and fit where these are known; see
             `rgspipe.viewer.material`.
@@ -209,7 +216,10 @@ def view(
     if lights is not None:
         rig = tuple(light.to(torch.float64).detached() for light in as_rig(lights))
     found = None if fit is None else Found.of(as_one_of(fit, FitResult, "fit", "Pass what rg.fit_lights returned."))
-    photographs = as_photographs(cameras, images)
+    is_told = not isinstance(emitters, str | None)
+    if isinstance(emitters, str) and emitters != "auto":
+        raise InputError("emitters", expected='"auto", masks or None', found=repr(emitters), remedy="Choose one.")
+    photographs = as_photographs(cameras, images, masks, emitters if is_told else None)
     own = [Case("given", photographs, found=found)] if found is not None or photographs else []
     every, known = (*own, *cases), tuple(references)
     taken = [photograph for case in every for photograph in case.photographs]
@@ -224,6 +234,7 @@ def view(
         exposure_free or unknowns["exposure_free"],
         base_scale_free or unknowns["base_scale_free"],
         around is not None or ambient is True or unknowns["ambient"],
+        emitters is not None,
     )
     exhibit = Exhibit(LampImages(scene), finder, camera, rig, around, every, known, resolution, world or World())
     viewer = Viewer(exhibit, 0 if is_open else port)
