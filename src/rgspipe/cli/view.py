@@ -27,7 +27,7 @@ PAGE_KEYS = {
 KEYS = {
     "lights": "light file: the lamps at first",
     "target": "folder with a target: photographs of the scene under lamps that are to be found",
-    "fit": "folder of a target's fit (with lights.json), whose lamps are shown with their regions",
+    "fit": "folder of a target's fit (with lights.json), whose lamps are shown with their regions, or of a track",
     **PAGE_KEYS,
 }
 
@@ -67,13 +67,14 @@ def view_folder(arguments: Sequence[str]) -> int:
     from rgspipe.stages.scene.export import world_of
     from rgspipe.stages.scene.light_origin import elsewhere_line, origin_of
     from rgspipe.stages.sources import check_target
-    from rgspipe.viewer.material import Case, case_in, found_in
+    from rgspipe.viewer.material import Case, case_in
     from rgspipe.viewer.serve import view
+    from rgspipe.viewer.tracks import found_or_followed
 
     device = chosen_device(asked.device)
     if asked.target is not None:
         check_target(asked.target)
-    found = None if asked.fit is None else found_in(asked.fit)
+    found = None if asked.fit is None else found_or_followed(asked.fit)
     given = [] if asked.lights is None else [Path(asked.lights)]
     given += [] if asked.fit is None else [Path(asked.fit) / "lights.json"]
     for line in filter(None, (elsewhere_line(file, Path(asked.folder) / SURFELS) for file in given)):

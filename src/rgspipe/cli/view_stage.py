@@ -77,7 +77,7 @@ def _serve(made: _Made) -> int:
     page = config.viewer
     viewer = view(
         FrozenScene.load(freeze.folder()).to(chosen_device(config.device)),
-        cases=[*_cases(made, config), *captured(made.find, config)],
+        cases=[*_cases(made, config), *captured(made.find, config), *_tracks(made)],
         references=references(None if dataset is None else dataset.folder()),
         port=page.port,
         resolution=page.resolution,
@@ -114,6 +114,15 @@ def _cases(made: _Made, config: RgspipeConfig) -> list:
         found = found_in(folder) if folder is not None and folder.is_dir() else None
         cases.append(_case(target, config, () if truth is None else read_lights(truth), found))
     return cases
+
+
+def _tracks(made: _Made) -> list:
+    """The track of this configuration, if it is made."""
+    from rgspipe.viewer.material import Case
+    from rgspipe.viewer.tracks import FRAMES, track_in
+
+    track = made.find("track")
+    return [] if track is None else [Case("track", found=track_in(track.path / FRAMES))]
 
 
 def _case(target: Target, config: RgspipeConfig, truth: LightRig, found: Found | None) -> Case:

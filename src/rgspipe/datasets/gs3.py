@@ -152,11 +152,11 @@ def target_folders(root: str | Path) -> list[Path]:
         return []
     listed = _listed_targets(folder)
     there = (path.name for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
-    names: Iterable[str] = listed or sorted(there, key=_counted)
+    names: Iterable[str] = listed or sorted(there, key=counted)
     return [folder / name for name in names]
 
 
-def _counted(name: str) -> tuple[list[tuple[float, str]], str]:
+def counted(name: str) -> tuple[list[tuple[float, str]], str]:
     """What puts names in order: numbers in them by value, so that frame_2 goes before frame_10."""
     parts = re.findall(r"\d+|\D+", name)
     return [(int(part), "") if part.isdecimal() else (math.inf, part) for part in parts], name

@@ -26,7 +26,7 @@ MOST_FURTHER = 12
 KINDS = {
     "found": ("regions", "Where found lamps are with 95 % probability, in orange."),
     "others": ("alternatives", "Lamps that the search ruled out (grey) or could not (red); their numbers are listed."),
-    "way": ("way of search", "From its start to the lamps that were found, in blue."),
+    "way": ("way", "Of the search from its start to the lamps that were found, or of lamps that move, in blue."),
     "truth": ("true lamps", "True places of the lamps where they are known, in green."),
     "cameras": (
         "cameras",
@@ -146,11 +146,12 @@ class Drawings:
 
 
 def ways(path: Sequence[LightRig]) -> list[np.ndarray]:
-    """(steps, 3) places of each lamp on the way of a search, as far as it had as many lamps as at its end."""
-    kept = [rig for rig in path if len(rig) == len(path[-1])] if path else []
+    """(steps, 3) places of each lamp on a way, as far as it had as many lamps as at last."""
+    end = next((rig for rig in reversed(path) if rig), ())
+    kept = [rig for rig in path if len(rig) == len(end)]
     if len(kept) < 2:
         return []
-    return [np.array([rig[index].position.tolist() for rig in kept]) for index in range(len(kept[-1]))]
+    return [np.array([rig[index].position.tolist() for rig in kept]) for index in range(len(end))]
 
 
 def _clear(drawn: list) -> None:

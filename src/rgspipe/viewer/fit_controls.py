@@ -65,7 +65,9 @@ class FitControls:
                 "look from", [_FREE], hint="The camera of a photograph. Keys G, Shift-G (free)."
             )
             self._buttons += actions.offer(*self._offered())
-            self._step = gui.add_slider("step", 0, 1, 1, 1, hint="Lamps on the way of the search. Keys 8, 9.")
+            self._step = gui.add_slider(
+                "step", 0, 1, 1, 1, hint="Lamps on the way of the search, or in a frame. Keys 8, 9."
+            )
         for field, changed in ((self._case, self._open), (self._view, self._look), (self._step, self._go_back)):
             actions.field(field, changed)
         actions.keys(
@@ -73,7 +75,7 @@ class FitControls:
             Action("free view", "shift+G", "Stay where you are, with no photograph beside the picture.", self._let_go),
             Action("yellow camera", "shift+V", "Look through the camera that would tell most.", self._look_advised),
             Action("next target", "O", "Photographs of the next target.", self._next_case),
-            Action("step back", "8", "The lamps one step earlier on the way of the search.", lambda: self._walk(-1)),
+            Action("step back", "8", "The lamps one step, or one frame, earlier.", lambda: self._walk(-1)),
             Action("step on", "9", "The lamps one step later.", lambda: self._walk(1)),
         )
         self.refresh()
@@ -89,9 +91,10 @@ class FitControls:
         self._step.visible = last > 0
         if last > 0:
             self._step.max = last
-            self._step.value = last
+            self._step.value = found.step
+            self._step.label = "frame" if found.frames else "step"
         self._find.visible = bool(case.photographs)
-        self._told.content = _told(case, found)
+        self._told.content = _told(case, found, int(self._step.value))
 
     def find(self) -> None:
         """Search the lamps of the photographs, and show them with their regions."""
@@ -247,24 +250,32 @@ class FitControls:
         found = self._session.found
         if found is not None:
             self._session.change(found.path[int(self._step.value)], "step")
+            self._told.content = _told(self._session.case, found, int(self._step.value))
             self._lamps_changed()
             self._visit.changed()
 
 
-def _told(case: Case, found: Found | None) -> str:
+def _told(case: Case, found: Found | None, step: int) -> str:
     """What was found, or how many photographs there are to find lamps in, or why there are none."""
+    words = "" if found is None else _words(found, step)
     if not case.photographs:
         why = f"{case.lacking} Take one of this view: “{_TAKE}” under “photographs”, or key **P**."
-        return why if found is None else f"{_words(found)}\n\n{why}"
+        return why if found is None else f"{words}\n\n{why}"
     count = len(case.photographs)
-    return _words(found) if found is not None else f"{count} photograph{'s' * (count != 1)}."
+    return words or f"{count} photograph{'s' * (count != 1)}."
 
 
-def _words(found: Found) -> str:
-    """What a fit says of its lamps, and what it weighed them against, by the numbers in the picture."""
+def _words(found: Found, step: int) -> str:
+    """What a fit says of its lamps, and what it weighed them against, by the numbers in the picture.
+
+    Args:
+        step: of the path, whose frame is told where lamps move.
+    """
     # Lamps stand in lines of their own, which begin with blanks.
     text = "\n".join(f"- {line.strip()}" if line.startswith(" ") else f"\n{line}\n" for line in found.told.splitlines())
     text += f"\n{told_costs(found.costs)}"
+    if found.frames:
+        text += f"\n\n{found.frames[min(step, len(found.frames) - 1)]}"
     if found.alternatives:
         others = (f"{number}. {one.told}" for number, one in enumerate(found.alternatives, start=1))
         text += "\n\nWeighed against:\n\n" + "\n".join(others)

@@ -76,11 +76,12 @@ class Found:
         covariance: of each, which begins with its position; none of those if not known.
         told: what is to be thought of them.
         costs: robust cost of the best rig of each number of lamps that was tried.
-        path: the rigs on the way, from the start that won.
+        path: the rigs on the way, from the start that won; or of lamps that move, frame by frame.
         alternatives: what they were weighed against.
         exposures: of each photograph over the first one's; empty where they were known.
         base_scale: (3,) how many times images with the lamps off are in the photographs; once if None.
         ambient: (3,) radiance that comes from all around through openings; black if None.
+        frames: what each frame of lamps that move is called, and how it was found; empty where they stand.
     """
 
     lights: LightRig
@@ -92,6 +93,13 @@ class Found:
     exposures: tuple[float, ...] = ()
     base_scale: Tensor | None = None
     ambient: Tensor | None = None
+    frames: tuple[str, ...] = ()
+
+    @property
+    def step(self) -> int:
+        """Which of the path has its lights: the last of them, or the end of all."""
+        last = len(self.path) - 1
+        return next((index for index in range(last, 0, -1) if self.path[index] == self.lights), last)
 
     @property
     def unknowns(self) -> dict[str, bool]:

@@ -19,6 +19,7 @@ from rgspipe.arguments import as_one_of
 from rgspipe.errors import InputError
 from rgspipe.fitting import FitResult
 from rgspipe.fitting.fit import Emitters
+from rgspipe.fitting.tracking.frame import TrackedFrame
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera
@@ -29,6 +30,7 @@ from rgspipe.viewer.given import Masks, as_photographs
 from rgspipe.viewer.lamp_images import LampImages
 from rgspipe.viewer.material import Case, Found, Photograph
 from rgspipe.viewer.search import Finder
+from rgspipe.viewer.tracks import followed
 from rgspipe.viewer.visit import Exhibit
 
 if TYPE_CHECKING:
@@ -155,11 +157,17 @@ def _unsaid() -> contextlib.redirect_stdout:
     return contextlib.redirect_stdout(io.StringIO())
 
 
+def _found(fit: FitResult | Sequence[TrackedFrame]) -> Found:
+    if isinstance(fit, list | tuple) and fit and all(isinstance(frame, TrackedFrame) for frame in fit):
+        return followed(fit)
+    return Found.of(as_one_of(fit, FitResult, "fit", "Pass what rg.fit_lights or rg.track_lights returned."))
+
+
 def view(
     scene: FrozenScene,
     lights: Light | Sequence[Light] | None = None,
     *,
-    fit: FitResult | None = None,
+    fit: FitResult | Sequence[TrackedFrame] | None = None,
     cameras: Camera | Sequence[Camera] = (),
     images: Sequence[ArrayLike] | ArrayLike = (),
     masks: Masks = None,
@@ -183,7 +191,8 @@ def view(
     Args:
         scene: the scene.
         lights: the lamps at first; if None those of `fit` or of the first case's fit, or one above the middle.
-        fit: what `fit_lights` found. What it left open besides lamps is left open in searches of the page, too.
+        fit: what `fit_lights` found, or the frames that `track_lights` followed. What a fit left open besides lamps is
+            left open in searches of the page, too.
         cameras: of `images`; one stands for a list of it.
         images: (H, W, 3) linear radiance per camera, under lamps that `fit` found or that are to be found on the page.
         masks: (H, W) per camera, the scene's share of each pixel; 1 if None.
@@ -215,7 +224,7 @@ def view(
     rig = None
     if lights is not None:
         rig = tuple(light.to(torch.float64).detached() for light in as_rig(lights))
-    found = None if fit is None else Found.of(as_one_of(fit, FitResult, "fit", "Pass what rg.fit_lights returned."))
+    found = None if fit is None else _found(fit)
     is_told = not isinstance(emitters, str | None)
     if isinstance(emitters, str) and emitters != "auto":
         raise InputError("emitters", expected='"auto", masks or None', found=repr(emitters), remedy="Choose one.")
