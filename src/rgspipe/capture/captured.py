@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from rgspipe.arguments import as_count, as_several
+from rgspipe.capture.bulbs import without_bulbs
 from rgspipe.capture.certainty import Certainty
 from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem
@@ -159,7 +160,8 @@ def _measured(
     found, said = {}, Said.of(options)
     for name in dict.fromkeys(view.lighting for view in views):
         own = [index for index, view in enumerate(views) if view.lighting == name]
-        chosen, taken = [weights[index] for index in own], [views[index] for index in own]
+        chosen = [weights[index] for index in own]
+        taken = without_bulbs(chosen, [views[index] for index in own], surfels)
         bent = options.response == "free"
         if bent:
             check_brackets(taken, options.exposure)

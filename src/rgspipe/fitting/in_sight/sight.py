@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 import torch
+from torch import Tensor
 
 from rgspipe.fitting.model.views import LEAST_SHARE, PreparedViews
 from rgspipe.renderer.view_weights import ViewWeights
-from rgspipe.scene import Camera
+from rgspipe.scene import Camera, Surfels
 
 Numbers = npt.NDArray[np.float64]
 
@@ -40,18 +41,20 @@ class Sight:
 
 def sights(views: PreparedViews) -> tuple[Sight, ...]:
     """Of each view."""
-    return tuple(_sight(views, view, index) for index, view in enumerate(views.views))
+    pairs = zip(views.views, views.masks, strict=True)
+    surfels = replace(views.frozen.bvh.surfels, albedo=views.frozen.surfels.albedo)
+    return tuple(sight_of(view, surfels, mask) for view, mask in pairs)
 
 
-def _sight(views: PreparedViews, view: ViewWeights, index: int) -> Sight:
-    surfels, size = views.frozen.surfels, (view.camera.height, view.camera.width)
+def sight_of(view: ViewWeights, surfels: Surfels, mask: Tensor) -> Sight:
+    """Of one view of surfels, where its `mask` (H·W values) has the scene in sight."""
+    size = (view.camera.height, view.camera.width)
     # From the camera, as float32 keeps no digits of what is far from the origin.
-    away = (views.frozen.bvh.surfels.centers - view.camera.origin.to(surfels.centers.device)).float()
+    away = (surfels.centers - view.camera.origin.to(surfels.centers.device)).float()
     values = torch.cat([surfels.albedo.float().mean(dim=1, keepdim=True), away], dim=1)
     coverage = view.coverage.double().cpu()
     seen = (view.operator @ values).double().cpu() / coverage.clamp(min=LEAST_SHARE)[:, None]
-    mask = views.masks[index].reshape(-1).double().cpu()
-    surface = (coverage > LEAST_SHARE) & (mask >= LEAST_SHARE)
+    surface = (coverage > LEAST_SHARE) & (mask.reshape(-1).double().cpu() >= LEAST_SHARE)
     distance = seen[:, 1:].norm(dim=1)
     stacked = (surface, seen[:, 0].clamp(min=DARKEST), distance, pixel_angles(view.camera))
     return Sight(view.camera, *(part.reshape(size).numpy() for part in stacked))
