@@ -2,8 +2,8 @@
 
 A scan or a model seldom holds a lamp's bulb. Its pixels then look at the wall behind it, a hundred times brighter than
 a reflection is, from each camera at another place. Where other photographs show that place, too, they contradict it;
-where none does, all surfaces would receive the light of a lamp at the wall, of any strength. What is bright in two
-photographs in one place, such as a window or a screen, stands there and shines on.
+where none does, all surfaces would receive the light of a lamp at the wall, of any strength. What is as bright in most
+other photographs, such as a window or a screen, stands there and shines on, and so does a lamp's reflection.
 """
 
 from __future__ import annotations
@@ -12,18 +12,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy.ndimage
 import torch
 
-from rgspipe.capture.photographs import SHOWN, Numbers
+from rgspipe.capture.exposures import mean_shown
+from rgspipe.capture.photographs import SHOWN, Numbers, TracedPhotograph
 from rgspipe.datasets.views import View
-from rgspipe.fitting.in_sight.lamp import LampInSight
-from rgspipe.fitting.in_sight.sight import Sight, sight_of
+from rgspipe.fitting.in_sight.lamp import BESIDE, TOUCHING, Mask
+from rgspipe.fitting.in_sight.sight import sight_of
 from rgspipe.fitting.in_sight.suspects import suspects
 from rgspipe.renderer.view_weights import ViewWeights
 from rgspipe.scene.surfels import Surfels
 
-#: A place shines itself if other photographs show at least so much of it as bright.
-BORNE_OUT = 0.5
+#: A pixel is borne out if other photographs show what is there at least so bright, over the pixel's own radiance.
+#: Surfels at the rim of a window have a part of its radiance; bulbs have a hundred times that of the wall.
+BORNE_OUT = 0.1
 
 
 def without_bulbs(weights: Sequence[ViewWeights], views: Sequence[View], surfels: Surfels) -> list[View]:
@@ -35,26 +38,49 @@ def without_bulbs(weights: Sequence[ViewWeights], views: Sequence[View], surfels
     """
     if len(views) < 2:
         return list(views)
-    plain = replace(surfels, albedo=torch.ones_like(surfels.albedo))
-    sights = [sight_of(weight, plain, view.alpha) for weight, view in zip(weights, views, strict=True)]
-    lamps = suspects(sights, [_grey(sight, view) for sight, view in zip(sights, views, strict=True)], needed=0.0)
-    shown = [_surfels_of(weights[lamp.view], lamp) for lamp in lamps]
-    found = list(views)
-    for number, lamp in enumerate(lamps):
-        elsewhere = [own for own, other in zip(shown, lamps, strict=True) if other.view != lamp.view]
-        borne_out = sum(elsewhere, np.zeros(len(surfels))) > SHOWN
-        if shown[number] @ borne_out < BORNE_OUT * shown[number].sum():
-            alpha = found[lamp.view].alpha
-            dark = torch.from_numpy(lamp.pixels).reshape(alpha.shape)
-            found[lamp.view] = replace(found[lamp.view], alpha=torch.where(dark, 0.0, alpha))
+    bright = [_bright(*pair, surfels) for pair in zip(weights, views, strict=True)]
+    if not any(mask.any() for mask in bright):
+        return list(views)
+    shown = _shown(weights, views)
+    return [
+        _without(view, weight, mask, np.delete(shown, v, axis=0)) if mask.any() else view
+        for v, (view, weight, mask) in enumerate(zip(views, weights, bright, strict=True))
+    ]
+
+
+def _bright(weight: ViewWeights, view: View, surfels: Surfels) -> Mask:
+    """(H, W) pixels that are compact and brighter than reflections, of surfaces that are taken to be all alike."""
+    sight = sight_of(weight, replace(surfels, albedo=torch.ones_like(surfels.albedo)), view.alpha)
+    found = np.zeros(sight.surface.shape, dtype=bool)
+    for lamp in suspects([sight], [_grey(view)], needed=0.0):
+        found |= lamp.core
     return found
 
 
-def _grey(sight: Sight, view: View) -> Numbers:
+def _shown(weights: Sequence[ViewWeights], views: Sequence[View]) -> Numbers:
+    """(V, N) grey radiance of each surfel in each photograph; NaN where it does not show it."""
+    means = []
+    for weight, view in zip(weights, views, strict=True):
+        photograph = TracedPhotograph.of(weight, view)
+        mean, count = mean_shown(photograph, _grey(view).reshape(-1, 1), photograph.base)
+        means.append(np.where(count > SHOWN, mean[:, 0], np.nan))
+    return np.stack(means)
+
+
+def _without(view: View, weight: ViewWeights, bright: Mask, others: Numbers) -> View:
+    """The view without those of its `bright` pixels that the `others` (V − 1, N) do not bear out, and what is beside
+    them."""
+    known = ~np.isnan(others).all(axis=0)
+    elsewhere = np.zeros(others.shape[1])
+    elsewhere[known] = np.nanmedian(others[:, known], axis=0)
+    expected = (weight.operator.to_scipy() @ elsewhere).reshape(bright.shape)
+    lamp = bright & (expected < BORNE_OUT * _grey(view))
+    if not lamp.any():
+        return view
+    dark = torch.from_numpy(scipy.ndimage.binary_dilation(lamp, TOUCHING, BESIDE))
+    return replace(view, alpha=torch.where(dark, 0.0, view.alpha))
+
+
+def _grey(view: View) -> Numbers:
     """(H, W) mean radiance of the channels."""
-    return view.image.reshape(*sight.surface.shape, 3).double().mean(dim=2).numpy()
-
-
-def _surfels_of(weight: ViewWeights, lamp: LampInSight) -> Numbers:
-    """(N,) pixels of a lamp that look at each surfel."""
-    return weight.operator.to_scipy().T @ lamp.core.reshape(-1).astype(np.float64)
+    return view.image.double().mean(dim=2).numpy()
