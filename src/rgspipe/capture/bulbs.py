@@ -39,13 +39,16 @@ def without_bulbs(weights: Sequence[ViewWeights], views: Sequence[View], surfels
     if len(views) < 2:
         return list(views)
     bright = [_bright(*pair, surfels) for pair in zip(weights, views, strict=True)]
-    if not any(mask.any() for mask in bright):
-        return list(views)
-    shown = _shown(weights, views)
-    return [
-        _without(view, weight, mask, np.delete(shown, v, axis=0)) if mask.any() else view
-        for v, (view, weight, mask) in enumerate(zip(views, weights, bright, strict=True))
-    ]
+    lamps, more = [np.zeros_like(mask) for mask in bright], any(mask.any() for mask in bright)
+    while more:
+        # One bulb may bear out another, until that is left out.
+        shown, before = _shown(weights, views, lamps), lamps
+        lamps = [
+            own | (mask & _contradicted(view, weight, np.delete(shown, v, axis=0))) if mask.any() else own
+            for v, (view, weight, mask, own) in enumerate(zip(views, weights, bright, before, strict=True))
+        ]
+        more = any((own != known).any() for own, known in zip(lamps, before, strict=True))
+    return [_without(view, lamp) if lamp.any() else view for view, lamp in zip(views, lamps, strict=True)]
 
 
 def _bright(weight: ViewWeights, view: View, surfels: Surfels) -> Mask:
@@ -57,26 +60,28 @@ def _bright(weight: ViewWeights, view: View, surfels: Surfels) -> Mask:
     return found
 
 
-def _shown(weights: Sequence[ViewWeights], views: Sequence[View]) -> Numbers:
-    """(V, N) grey radiance of each surfel in each photograph; NaN where it does not show it."""
+def _shown(weights: Sequence[ViewWeights], views: Sequence[View], lamps: Sequence[Mask]) -> Numbers:
+    """(V, N) grey radiance of each surfel in each photograph beside `lamps`; NaN where it does not show it."""
     means = []
-    for weight, view in zip(weights, views, strict=True):
+    for weight, view, lamp in zip(weights, views, lamps, strict=True):
         photograph = TracedPhotograph.of(weight, view)
-        mean, count = mean_shown(photograph, _grey(view).reshape(-1, 1), photograph.base)
+        counted = np.where(lamp.reshape(-1), np.float32(0.0), photograph.base)
+        mean, count = mean_shown(photograph, _grey(view).reshape(-1, 1), counted)
         means.append(np.where(count > SHOWN, mean[:, 0], np.nan))
     return np.stack(means)
 
 
-def _without(view: View, weight: ViewWeights, bright: Mask, others: Numbers) -> View:
-    """The view without those of its `bright` pixels that the `others` (V − 1, N) do not bear out, and what is beside
-    them."""
+def _contradicted(view: View, weight: ViewWeights, others: Numbers) -> Mask:
+    """(H, W) pixels that the `others` (V − 1, N) do not bear out."""
     known = ~np.isnan(others).all(axis=0)
     elsewhere = np.zeros(others.shape[1])
     elsewhere[known] = np.nanmedian(others[:, known], axis=0)
-    expected = (weight.operator.to_scipy() @ elsewhere).reshape(bright.shape)
-    lamp = bright & (expected < BORNE_OUT * _grey(view))
-    if not lamp.any():
-        return view
+    grey = _grey(view)
+    return (weight.operator.to_scipy() @ elsewhere).reshape(grey.shape) < BORNE_OUT * grey
+
+
+def _without(view: View, lamp: Mask) -> View:
+    """The view without the pixels of a lamp and what is beside them."""
     dark = torch.from_numpy(scipy.ndimage.binary_dilation(lamp, TOUCHING, BESIDE))
     return replace(view, alpha=torch.where(dark, 0.0, view.alpha))
 
