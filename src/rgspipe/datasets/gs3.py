@@ -6,8 +6,6 @@ broken, missing or ambiguous gets past this module.
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +21,7 @@ from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vec
 from rgspipe.datasets.info import INFO, DatasetInfo, read_info
 from rgspipe.datasets.input_file import input_folder, is_plain_name
 from rgspipe.datasets.json_file import read_json, required, shown
+from rgspipe.datasets.name_order import name_order
 from rgspipe.datasets.saturation import with_saturation
 from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
 from rgspipe.datasets.views import Dataset, Target, View
@@ -152,14 +151,8 @@ def target_folders(root: str | Path) -> list[Path]:
         return []
     listed = _listed_targets(folder)
     there = (path.name for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
-    names: Iterable[str] = listed or sorted(there, key=counted)
+    names: Iterable[str] = listed or sorted(there, key=name_order)
     return [folder / name for name in names]
-
-
-def counted(name: str) -> tuple[list[tuple[float, str]], str]:
-    """What puts names in order: numbers in them by value, so that frame_2 goes before frame_10."""
-    parts = re.findall(r"\d+|\D+", name)
-    return [(int(part), "") if part.isdecimal() else (math.inf, part) for part in parts], name
 
 
 def _load_targets(root: Path) -> tuple[Target, ...]:

@@ -91,7 +91,6 @@ def fit_materials(
     store = prepared.store.beside()
     models = build_view_models(prepared.bvh, prepared.weights, lighting, options.at_pixels, store)
     problem = AlbedoProblem.build(surfels, models, views)
-    photographs = problem.photographs
     rounds = options.rounds if bounces else min(DIRECT_ROUNDS, options.rounds)
     stored = prepared.store.stored + store.stored
     glossy = None
@@ -106,7 +105,7 @@ def fit_materials(
         )
     if glossy is not None and surfels.gloss is not None:
         known = None if prior is None else prior(surfels)
-        fit = fit_gloss(glossy, photographs, surfels, None, rounds, known, options.seed)
+        fit = fit_gloss(glossy, problem.photographs, surfels, None, rounds, known, options.seed)
         if fit is not None:
             return FittedMaterials(prepared, fit.surfels, fit.radiance, fit.renders, stored)
     surfels, known = replace(surfels, gloss=None), None
@@ -117,7 +116,7 @@ def fit_materials(
     albedo, indirect = solve_albedo(problem, surfels, lighting, transport, rounds, known)
     surfels = replace(surfels, albedo=albedo)
     if glossy is not None:
-        fit = fit_gloss(glossy, photographs, surfels, indirect, rounds, known, options.seed)
+        fit = fit_gloss(glossy, problem.photographs, surfels, indirect, rounds, known, options.seed)
         if fit is not None:
             return FittedMaterials(prepared, fit.surfels, fit.radiance, fit.renders, stored)
     renders = tuple(problem.render(v, albedo, indirect) for v in range(len(views)))

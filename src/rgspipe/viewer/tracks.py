@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from rgspipe.datasets.gs3 import counted
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
+from rgspipe.datasets.name_order import name_order
 from rgspipe.errors import InputError
 from rgspipe.fitting.tracking.frame import TrackedFrame
 from rgspipe.scene import LightRig
@@ -34,7 +34,7 @@ def track_in(folder: Path) -> Found:
     Raises:
         InputError: there are none, or they cannot be read.
     """
-    files = sorted(folder.glob("*.json"), key=lambda file: counted(file.stem))
+    files = sorted(folder.glob("*.json"), key=lambda file: name_order(file.stem))
     if not files:
         raise InputError(folder, expected="light files, one a frame", found="none", remedy="Name a track's folder.")
     statuses = [str(read_json(file, "a frame's light file").get("status", "")) for file in files]

@@ -24,6 +24,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import LightRig, PointLight, SpotLight
 from rgspipe.stages.base import Need, StageContext
 from rgspipe.stages.relight import relight
+from rgspipe.stages.relight.scene import target_folders
 from rgspipe.store.artifacts import Artifact
 
 
@@ -160,6 +161,16 @@ def test_a_sweep_that_is_black_for_a_while_says_so(inputs, tmp_path: Path, capsy
     cone = {"relight__path__spot__cone_angle": 10.0, "effects__shadows": False}
     run(inputs, tmp_path, relight__sweep="aim", relight__path__frames=3, **way, **cone)
     assert "of 3 frames are black" in capsys.readouterr().out
+
+
+def test_folders_of_other_programs_are_no_targets(tmp_path: Path) -> None:
+    """Jupyter's .ipynb_checkpoints was taken for the first target, whose transforms.json was asked for."""
+    (tmp_path / "targets/.ipynb_checkpoints").mkdir(parents=True)
+    with pytest.raises(InputError, match="expected fit targets, for their cameras, found none"):
+        target_folders(tmp_path)
+    for name in ("frame_10", "frame_9"):
+        (tmp_path / "targets" / name).mkdir()
+    assert [path.name for path in target_folders(tmp_path)] == ["frame_9", "frame_10"]
 
 
 @pytest.mark.parametrize(

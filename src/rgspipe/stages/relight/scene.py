@@ -12,8 +12,8 @@ import numpy as np
 from torch import Tensor
 
 from rgspipe.config import RgspipeConfig
+from rgspipe.datasets import gs3
 from rgspipe.datasets.exr import write_image
-from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.light_file import ambient_fields, write_lights
 from rgspipe.datasets.location import dataset_root, open_dataset
 from rgspipe.datasets.views import View
@@ -154,7 +154,7 @@ def configured_cameras(config: RgspipeConfig, folder: Path | None) -> list[Camer
 def _camera_views(config: RgspipeConfig, folder: Path | None) -> Sequence[View]:
     split = config.relight.views
     if split == "targets":
-        return load_target(_first_target(config, folder)).views
+        return gs3.load_target(_first_target(config, folder)).views
     dataset = open_dataset(folder, train=split == "train", test=split == "test", targets=False)
     return dataset.train if split == "train" else dataset.left_out()
 
@@ -172,11 +172,11 @@ def target_folders(folder: Path) -> list[Path]:
     Raises:
         InputError: there are none.
     """
-    targets = dataset_root(folder) / "targets"
-    found = sorted(path for path in targets.glob("*") if path.is_dir())
+    root = dataset_root(folder)
+    found = gs3.target_folders(root)
     if not found:
         raise InputError(
-            targets,
+            root / "targets",
             expected="fit targets, for their cameras",
             found="none",
             remedy="Take other cameras: relight.views=test.",
