@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rgspipe.scene import Camera
@@ -32,6 +32,7 @@ def test_the_browser_looks_along_z_and_the_scene_the_other_way() -> None:
     assert ahead.tolist() == [0.0, 0.0, 1.0] and up.tolist() == [0.0, -1.0, 0.0]
 
 
+@settings(deadline=None)
 @given(NUMBER, NUMBER, NUMBER)
 def test_an_axis_comes_back(x: float, y: float, z: float) -> None:
     axis = torch.tensor([x, y, z], dtype=torch.float64)
@@ -42,6 +43,7 @@ def test_an_axis_comes_back(x: float, y: float, z: float) -> None:
     torch.testing.assert_close(axis_of(wxyz), axis / axis.norm(), atol=1e-9, rtol=0.0)
 
 
+@settings(deadline=None)
 @given(st.tuples(NUMBER, NUMBER, NUMBER), st.tuples(*[st.floats(0.0, 3.0)] * 3))
 def test_the_first_camera_sees_the_whole_scene(lower: tuple[float, ...], sides: tuple[float, ...]) -> None:
     low = torch.tensor(lower, dtype=torch.float64)

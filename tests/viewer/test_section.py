@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import torch
 
 from rgspipe.renderer.frozen import FrozenScene
@@ -31,7 +32,8 @@ def test_without_anything_before_the_plane_nothing_changes(frozen: FrozenScene) 
 
 def test_rays_that_do_not_come_through_see_nothing(frozen: FrozenScene) -> None:
     camera = Camera.look_at([0.0, -0.2, 0.0], [0.0, 0.5, 0.0], fov_degrees=60, width=8, height=8)
-    assert not frozen.render(CutCamera.of(camera, 1, -0.4), LAMP).any()
+    with pytest.warns(UserWarning, match="The camera sees nothing"):
+        assert not frozen.render(CutCamera.of(camera, 1, -0.4), LAMP).any()
 
 
 def test_sections_are_told_apart() -> None:

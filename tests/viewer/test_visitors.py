@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rgspipe.renderer.frozen import FrozenScene
@@ -20,7 +21,7 @@ import zstandard  # viser brings both
 from websockets.sync.client import ClientConnection
 
 from rgspipe.viewer.page import Page
-from viewer.visiting import message, visitor, wait_for
+from viewer.visiting import message, visited, visitor, wait_for
 
 NAN = float("nan")
 
@@ -36,6 +37,9 @@ IMPOSSIBLE: dict[str, dict[str, Any]] = {
     "a place of one number, a turn of a word": {"position": [1.0], "wxyz": ["x"]},
     "a place beyond all numbers": {"position": [1e300] * 3, "look_at": [-1e308] * 3},
 }
+
+#: viser says so in the server's log where a browser tells of words in the place of numbers, as these tests do.
+TOLD_OF_WORDS = pytest.mark.filterwarnings(r"ignore:\[viser\] .* does not match annotation")
 
 #: Where the first picture is taken from.
 EYE = [-0.45, -0.45, 0.0]
@@ -67,6 +71,7 @@ def threads() -> list[str]:
     return [one.name for one in threading.enumerate() if one.name.startswith("rgspipe-page")]
 
 
+@TOLD_OF_WORDS
 @pytest.mark.parametrize("first", IMPOSSIBLE.values(), ids=IMPOSSIBLE)
 def test_a_page_waits_for_a_camera_that_can_be_and_goes_with_its_visitor(viewer: Viewer, first: dict[str, Any]) -> None:
     with visitor(viewer) as browser:
@@ -81,6 +86,7 @@ def test_a_page_waits_for_a_camera_that_can_be_and_goes_with_its_visitor(viewer:
     wait_for(lambda: not viewer.pages and not threads())
 
 
+@TOLD_OF_WORDS
 def test_a_camera_that_can_be_no_more_harms_no_page(viewer: Viewer) -> None:
     with visitor(viewer) as browser:
         browser.send(message())
@@ -94,6 +100,14 @@ def test_a_camera_that_can_be_no_more_harms_no_page(viewer: Viewer) -> None:
         page._go_to(viewer._exhibit.camera)
         assert page._client.camera.position.tolist() == pytest.approx(EYE)
     wait_for(lambda: not viewer.pages and not threads())
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_is_made_for_a_visitor_who_has_left_is_no_warning(viewer: Viewer) -> None:
+    with visited(viewer) as (page, _):
+        pass
+    assert page._client._websock_connection.get_message_buffer().done
+    page._show(np.zeros((8, 8, 3), np.uint8), 1.0, True)
 
 
 def test_the_first_picture_is_taken_from_where_browsers_are_told_to_begin(viewer: Viewer) -> None:

@@ -48,6 +48,8 @@ class Page:
 
     def __init__(self, client: viser.ClientHandle, exhibit: Exhibit, is_phone: bool = False) -> None:
         self._upright = 1.0 if is_phone else UPRIGHT
+        # Who leaves does not wait for the picture in the making; viser 1.1.1 would warn, and has no door to that.
+        client._websock_connection.get_message_buffer()._sanctioned_dead_writes += 1
         self._client, self._exhibit, self._resolution, self._seen = client, exhibit, exhibit.resolution, b""
         self._wanted: Camera | None = None
         self._begun: tuple[Camera, float, float] | None = None

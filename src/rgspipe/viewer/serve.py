@@ -8,7 +8,6 @@ import io
 import logging
 import re
 import threading
-import warnings
 from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -61,8 +60,6 @@ class Viewer:
         self._exhibit, self._door, self._is_closed = exhibit, threading.Lock(), False
         # Both say where they listen, which is another address than that which others are given.
         logging.getLogger("websockets").setLevel(logging.WARNING)
-        # Who leaves does not wait for the picture in the making.
-        warnings.filterwarnings("ignore", r"Queued a \w+ on a closed connection", UserWarning)
         with _unsaid(), _own_pages_alone():
             self._server = viser.ViserServer(host=LOOPBACK, port=port, verbose=False)
         self._relay: Relay | None = None

@@ -51,5 +51,5 @@ def _track(rigs: Sequence[LightRig], names: Sequence[str], statuses: Sequence[st
     """Lamps as they are in the last frame that has any."""
     lights = next((rig for rig in reversed(rigs) if rig), ())
     counts = ", ".join(f"{count} {status}".replace("_", " ") for status, count in Counter(statuses).items())
-    told = [f"{name}: {status}".replace("_", " ") for name, status in zip(names, statuses, strict=True)]
+    told = [f"{name}: {status.replace('_', ' ')}" for name, status in zip(names, statuses, strict=True)]
     return Found(lights, told=f"{len(rigs)} frames: {counts}.", path=tuple(rigs), frames=tuple(told))

@@ -13,39 +13,26 @@ import pytest
 import torch
 from PIL import Image
 
-from frozen_store import RESOLUTION, artifact, frozen_artifact, write_targets
+from frozen_store import RESOLUTION, frozen_artifact
 from lit_room import room_cameras
+from moving_lamp import NAMES, PLACES, followed_lamp
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
-from rgspipe.fitting import FitViews
-from rgspipe.renderer.frozen import FrozenScene
-from rgspipe.scene import PointLight
 from rgspipe.stages.base import StageContext
 from rgspipe.stages.lights import track
 from rgspipe.stages.lights.fit_light import Fitter
 
 
 def test_a_track_is_written_and_compared_with_the_truth(tmp_path: Path) -> None:
-    freeze = frozen_artifact(tmp_path / "store")
-    places = [(0.1 - 0.06 * k, -0.25 + 0.05 * k, 0.3) for k in range(3)]
-    lights = [PointLight(torch.tensor(place, dtype=torch.float64), torch.ones(3).double()) for place in places]
-    views = FitViews.prepare(FrozenScene.load(freeze.folder()), room_cameras(RESOLUTION), sharp=True)
-    names = [f"rig_{k:04d}" for k in range(3)]
-    images = {name: views.render(light) for name, light in zip(names, lights, strict=True)}
-    truths = {name: (light,) for name, light in zip(names, lights, strict=True)}
-    targets = artifact(tmp_path / "store", "generate_targets", lambda folder: write_targets(folder, images, truths))
-    config = with_changes(RgspipeConfig(stage="track"), {"views.count": 2})
-    (tmp_path / "out").mkdir()
-    context = StageContext(config, {"freeze": freeze, "generate_targets": targets}, {}, tmp_path / "out")
-    track.run(context)
+    _, context = followed_lamp(tmp_path / "store", tmp_path / "out")
     table = pd.read_csv(tmp_path / "out" / "track.csv")
-    assert sorted(table["status"])[:1] == ["searched"] and table["target"].tolist() == names
+    assert sorted(table["status"])[:1] == ["searched"] and table["target"].tolist() == NAMES
     assert set(table["status"]) <= {"searched", "tracked", "traced_back"}
     assert table["position_sd"].max() < 1e-2
     assert table["position_error"].max() < 1e-3 and table["intensity_error"].max() < 1e-2
-    for name, place in zip(names, places, strict=True):
+    for name, place in zip(NAMES, PLACES, strict=True):
         (light,) = read_lights(tmp_path / "out" / "frames" / f"{name}.json")
         assert float((light.position - torch.tensor(place, dtype=torch.float64)).norm()) < 1e-3
     with Image.open(tmp_path / "out" / "track.png") as picture:
