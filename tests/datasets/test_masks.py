@@ -50,6 +50,9 @@ def test_broken_masks_are_named(dataset: Path, change: Change) -> None:
     write_channels(dataset / "targets/one/mask.exr", {"Y": 2.0 * MASK.astype(np.float32)})
     with pytest.raises(InputError, match=r"mask\.exr.*0 to 1"):
         load_target(dataset / "targets/one")
+    write_channels(dataset / "targets/one/mask.exr", {"Y": 0.0 * MASK.astype(np.float32)})
+    with pytest.raises(InputError, match=r"mask\.exr.*found black everywhere\. Invert it"):
+        load_target(dataset / "targets/one")
 
 
 def test_where_lamps_are_is_read_and_leaves_the_image_alone(dataset: Path, change: Change) -> None:

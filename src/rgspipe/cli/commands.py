@@ -75,7 +75,7 @@ rgspipe view FOLDER [lights=FILE] [target=DIR] [fit=DIR]
   target      folder with photographs of the scene under lamps that are to be
               found
   fit         folder of a target's fit (with lights.json), whose lamps are shown
-              with their regions
+              with their regions; or of a track (with frames/)
 {_PAGE}
 stage=view shows the configured scene with its photographs and fits instead.""",
         ("lights=", "target=", "fit=", *_PAGE_WORDS),

@@ -211,6 +211,7 @@ def _load_view(
     camera = entry.camera(image.shape[1], image.shape[0])
     mask = None if entry.mask_path is None else read_mask(entry.mask_path, camera)
     if mask is not None:
+        _check_mask(entry.mask_path, mask)
         image, alpha = image * mask[..., None], alpha * mask
     surface = _load_surface(entry, camera, info, needed=depth)
     view = View(
@@ -229,6 +230,12 @@ def _load_view(
     if base is None:
         return view
     return replace(view, base=read_base(base, camera, mask), base_exposure=exposure_of(base))
+
+
+def _check_mask(path: Path, mask: torch.Tensor) -> None:
+    if not mask.any():
+        expected, remedy = "a mask that is white where pixels count", "Invert it, or leave the frame out."
+        raise InputError(path, expected=expected, found="black everywhere", remedy=remedy)
 
 
 def _name(path: Path, root: Path) -> str:

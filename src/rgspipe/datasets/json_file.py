@@ -55,9 +55,13 @@ def numbers(value: object, count: int, where: str | Path, key: str) -> list[floa
     good = isinstance(value, list) and len(value) == count and all(is_number(item) for item in value)
     if not good:
         raise InputError(
-            where, expected=f'{count} finite numbers under "{key}"', found=shown(value), remedy=f'Correct "{key}".'
+            where, expected=f'{_count(count)} under "{key}"', found=shown(value), remedy=f'Correct "{key}".'
         )
     return [float(item) for item in value]
+
+
+def _count(count: int) -> str:
+    return "a finite number" if count == 1 else f"{count} finite numbers"
 
 
 def whole(value: object, where: str | Path, key: str) -> int:

@@ -100,5 +100,19 @@ def astray(views: Sequence[View], along_rays: bool) -> list[AstrayView]:
     return [AstrayView(places[id(trials.views[k])], float(shares[k]), usual) for k in told.nonzero()[0]]
 
 
+def alone(views: Sequence[View], along_rays: bool) -> list[int]:
+    """Which views no other one shares a place with, where most views share many."""
+    measured = _measured(views)
+    if len(measured) < FEWEST_VIEWS:
+        return []
+    trials = Trials.draw(measured, along_rays)
+    stated = trials.agreement(READINGS[0])
+    tested = stated.agreeing + stated.contradicting
+    if np.median(tested) < LEAST_OF_ONE:
+        return []
+    places = {id(view): index for index, view in enumerate(views)}
+    return [places[id(trials.views[k])] for k in (tested == 0).nonzero()[0]]
+
+
 def _measured(views: Sequence[View]) -> list[View]:
     return [view for view in views if view.depth is not None and bool(view.depth.isfinite().any())]

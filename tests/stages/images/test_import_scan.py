@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from lit_room import BOX_CENTER, BOX_SIZE
 from photographed_room import LAMPS, photographs
@@ -173,3 +174,33 @@ def test_a_single_photograph_that_stands_elsewhere_is_named(
     imported(capture, tmp_path / "moved")
     name = Path(json.loads((capture / "transforms.json").read_text())["frames"][5]["file_path"]).name
     assert f"warning: {name}: " in capsys.readouterr().out
+
+
+def test_a_capture_that_measured_nothing_is_refused_where_it_is_read(capture: Path, tmp_path: Path) -> None:
+    """It was imported, and refused by the next stage with the keys of another layout."""
+    for path in (capture / "depth").iterdir():
+        Image.fromarray(np.zeros((32, 32), np.uint16)).save(path)
+    with pytest.raises(InputError, match=r"transforms\.json.*expected depth that is known.*found none in any of 12"):
+        imported(capture, tmp_path / "imported")
+
+
+def test_photographs_that_are_all_black_are_refused_where_they_are_read(capture: Path, tmp_path: Path) -> None:
+    for path in (capture / "images").iterdir():
+        Image.fromarray(np.zeros((32, 32, 3), np.uint8)).save(path)
+    with pytest.raises(InputError, match=r"transforms\.json.*images that are black.*Switch the lamps on"):
+        imported(capture, tmp_path / "imported")
+
+
+def test_masks_the_wrong_way_round_are_told(capture: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    levels = np.zeros((32, 32), np.uint8)
+    levels[:8] = 255
+    Image.fromarray(levels).save(capture / "mask.png")
+    content = json.loads((capture / "transforms.json").read_text())
+    for frame in content["frames"]:
+        frame["mask_path"] = "mask.png"
+    (capture / "transforms.json").write_text(json.dumps(content))
+    imported(capture, tmp_path / "imported")
+    assert "warning: masks or alpha leave out 75 %" in capsys.readouterr().out
+    Image.fromarray(0 * levels).save(capture / "mask.png")
+    with pytest.raises(InputError, match=r"mask\.png: expected a mask .* found black everywhere\. Invert it"):
+        imported(capture, tmp_path / "black")

@@ -52,9 +52,9 @@ class Imported:
     def words(self, layout: str) -> str:
         """The report for people."""
         exposures = ", made alike by their EXIF exposures" if self.exif else ""
+        photographs = f"{self.frames} photograph{'s' * (self.frames != 1)}{exposures}"
         lines = [
-            f"{layout}: {self.frames} photographs{exposures}; {self.with_depth} with depth, known in "
-            f"{100 * self.known:.0f} % of their pixels"
+            f"{layout}: {photographs}; {self.with_depth} with depth, known in {100 * self.known:.0f} % of their pixels"
         ]
         return "\n".join(lines + [f"  {note}" for note in self.notes])
 
@@ -163,6 +163,10 @@ def _used(frame: ScanFrame, picture: Picture, camera: Camera) -> np.ndarray | No
     if frame.mask is not None:
         mask = read_picture(frame.mask, "linear")
         check_shape(frame.mask, mask.light.shape, frame.lens)
+        if not mask.light.any():
+            found, remedy = "black everywhere", "Invert it if black is what counts, or leave the photograph out."
+            expected = "a mask that is black where the photograph is not to be used, and white elsewhere"
+            raise InputError(frame.mask, expected=expected, found=found, remedy=remedy)
         # Masks may be of levels 0 and 1: whatever is not black counts.
         hidden += [mask.hidden, (mask.light <= 0.0).any(axis=2)]
     if frame.border:

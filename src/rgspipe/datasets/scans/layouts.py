@@ -21,6 +21,7 @@ from rgspipe.datasets.scans import (
 )
 from rgspipe.datasets.scans.frame import Scan
 from rgspipe.datasets.scans.lens_check import check_lens
+from rgspipe.datasets.scans.missing_files import refuse_missing, without_missing
 from rgspipe.datasets.scans.options import LAYOUTS, ScanOptions
 from rgspipe.errors import InputError
 
@@ -50,10 +51,13 @@ def read_scan(root: str | Path, options: ScanOptions, *, depth: bool = True) -> 
         depth: whether some of the photographs must have depth.
 
     Raises:
-        InputError: no layout or several fit, files of the layout are missing or broken, or there is no depth.
+        InputError: no layout or several fit, files of the layout or photographs are missing or broken, or there is no
+            depth.
     """
     root = input_folder(root, "the folder of a capture")
-    scan = READERS[_layout(root, options)].read(root, options).thinned(options.frames)
+    scan = READERS[_layout(root, options)].read(root, options)
+    scan = (scan if options.missing == "refuse" else without_missing(scan)).thinned(options.frames)
+    refuse_missing(scan)
     if depth and all(frame.depth is None for frame in scan.frames):
         raise InputError(
             root,

@@ -21,6 +21,9 @@ class ScanOptions(Options):
 
     format: Literal[Layout, "auto"] = "auto"
     """the layout; auto: told by the files that are there"""
+    missing: Literal["refuse", "leave_out"] = "refuse"
+    """photographs of which a file is not there, as nerfstudio, Polycam, COLMAP and others list them: refused, or left
+    out and told"""
     frames: int = option(60, low=1, high=100_000)
     """at most so many photographs, evenly spaced"""
     resolution: int = option(160, low=8, high=8192)

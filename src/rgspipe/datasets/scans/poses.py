@@ -70,7 +70,7 @@ def matrix_of(value: object, where: str | Path) -> Numbers:
     if matrix.shape == (3, 4):
         matrix = np.concatenate([matrix, [[0.0, 0.0, 0.0, 1.0]]])
     if matrix.shape != (4, 4):
-        raise InputError(where, expected="a 4 × 4 matrix", found=shown(value), remedy="Correct it.")
+        raise InputError(where, expected="a 4 × 4 matrix of finite numbers", found=shown(value), remedy="Correct it.")
     return matrix
 
 

@@ -20,8 +20,8 @@ from rgspipe.datasets.read_files import files_read
 from rgspipe.datasets.views import Dataset
 from rgspipe.errors import InputError
 from rgspipe.stages.base import Stage, StageContext
-from rgspipe.stages.images.astray_views import tell_astray
 from rgspipe.stages.images.check_conventions import check_conventions
+from rgspipe.stages.images.odd_views import tell_astray, tell_odd_views
 from rgspipe.stages.images.scene_model import scene_model
 from rgspipe.stages.sources import require_images
 from rgspipe.store.artifacts import Artifact
@@ -42,7 +42,9 @@ def run(context: StageContext) -> None:
         dataset = _take(context, _existing_path(context.config, "the folder of a dataset"))
         info = read_info(dataset.root)
         along_rays = info is not None and info.depth_convention == "ray_distance"
-        tell_astray(dataset.train, [view.name for view in dataset.train], along_rays)
+        names = [view.name for view in dataset.train]
+        tell_astray(dataset.train, names, along_rays)
+        tell_odd_views(dataset.train, names)
     elif context.config.scene.is_capture:
         _take(context, context.inputs["import_scan"].folder())
     else:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rgspipe.capture.refusals import OFF
+from rgspipe.capture.refusals import OFF, check_views
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.gs3 import load_dataset
 from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.datasets.mesh.links import mesh_files
 from rgspipe.datasets.scans.frame import Scan
-from rgspipe.datasets.scans.importing import import_scan
+from rgspipe.datasets.scans.importing import Imported, import_scan
 from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.errors import InputError
 from rgspipe.renderer.mesh_passes import MeshPasses
 from rgspipe.stages.base import Stage, StageContext
-from rgspipe.stages.images.astray_views import tell_astray
 from rgspipe.stages.images.mesh_conventions import check_mesh
+from rgspipe.stages.images.odd_views import tell_astray, tell_odd_views
 from rgspipe.stages.images.scan_conventions import check_images, check_scan
 from rgspipe.stages.sources import mesh_path
 
@@ -29,15 +29,34 @@ def run(context: StageContext) -> None:
     mesh = read_mesh(mesh_path(config), config.scene.mesh) if config.scene.kind == "mesh" else None
     imported = import_scan(scan, options, context.folder, None if mesh is None else MeshPasses(mesh).seen_by)
     views = load_dataset(context.folder, targets=False).train
+    check_views(views, scan.stated)
+    names = [frame.image.name for frame in scan.frames]
     if mesh is None:
+        _require_depth(scan, imported)
         check_scan(scan, views)
         check_images(scan, views)
-        tell_astray(views, [frame.image.name for frame in scan.frames])
+        tell_astray(views, names)
     else:
         check_mesh(scan, views, mesh, mesh_path(config), config.scene.mesh)
+    tell_odd_views(views, names)
     for words in (imported.words(scan.layout), *(() if mesh is None else mesh.remarks)):
         print(as_keys(words))
     context.note(layout=scan.layout, frames=imported.frames, with_depth=imported.with_depth, exif=imported.exif)
+
+
+def _require_depth(scan: Scan, imported: Imported) -> None:
+    """Refuse a capture whose depth images measured nothing: its surfaces come of them.
+
+    Raises:
+        InputError: no pixel of any photograph has depth that is known and used.
+    """
+    if not imported.with_depth:
+        raise InputError(
+            scan.stated,
+            expected="depth that is known in some pixels of some photographs",
+            found=f"none in any of {imported.frames}: 0 or nothing everywhere, or left out by masks",
+            remedy="Export depth again, and check that masks are not the wrong way round (black is left out).",
+        )
 
 
 def _scan(config: RgspipeConfig) -> Scan:
