@@ -151,6 +151,12 @@ def test_lamps_of_another_scene_are_told(
         lights = tmp_path / scene / "freeze" / "aa" / "lights.json"
         assert view_folder([str(folder), f"lights={lights}", "browser=false"]) == 0
         assert capsys.readouterr().out.count("its lights are those of the scene hall") == said
+    # A track has no lights.json.
+    (tmp_path / "hall/freeze/aa/frames").mkdir()
+    lights.rename(lights.with_name("kept"))
+    write_lights(tmp_path / "hall/freeze/aa/frames/1.json", PointLight([0.0, 0.0, 0.1], 1.0), {"status": "tracked"})
+    assert view_folder([str(folder), f"fit={tmp_path / 'hall/freeze/aa'}", "browser=false"]) == 0
+    assert "aa/frames: its lights are those of the scene hall" in capsys.readouterr().out
 
 
 class Served:

@@ -18,7 +18,7 @@ from rgspipe.renderer.ambient import ambient_image
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.renderer.images.model import SurfelModel
 from rgspipe.scene import PointLight
-from rgspipe.scene.lights import KINDS
+from rgspipe.scene.lights import KINDS, SunLight
 from rgspipe.scene.surfels import Gloss
 from rgspipe.viewer.lamp_images import LampImages
 from rgspipe.viewer.material import Case, Found, Photograph
@@ -342,6 +342,11 @@ def test_a_refit_keeps_what_its_answer_was_weighed_against(session: Session) -> 
         assert session.found.alternatives == () and session.found.costs == {}
     session.take(searched)
     session.take(again)
+    assert session.found.alternatives == ()
+    # Suns are told apart by where they shine, not by where they are drawn.
+    sun, turned = (SunLight([0.0, 0.0, 0.0], 1.0, [x, 0.0, -1.0]) for x in (0.0, 0.05))
+    session.take(replace(searched, lights=(sun,)))
+    session.take(replace(again, lights=(turned,)), searched=False)
     assert session.found.alternatives == ()
 
 

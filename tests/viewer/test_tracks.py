@@ -14,6 +14,7 @@ from rgspipe.fitting.result import dark_result
 from rgspipe.fitting.tracking.frame import FrameStatus, TrackedFrame
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
+from rgspipe.scene.lights import SunLight
 from rgspipe.viewer.drawings import ways
 from rgspipe.viewer.material import Case
 from rgspipe.viewer.serve import view
@@ -52,6 +53,27 @@ def test_a_folder_of_fits_is_read_as_before(tmp_path: Path) -> None:
     (tmp_path / "frames").mkdir()
     with pytest.raises(InputError, match="light files, one a frame"):
         found_or_followed(tmp_path)
+
+
+def test_what_is_neither_a_fit_nor_a_track_is_refused_by_its_folder(tmp_path: Path) -> None:
+    """It was a light file in it that was missing, whose path was to be checked."""
+    with pytest.raises(
+        InputError, match=rf"{tmp_path}: expected the folder of a target's fit, .* found neither\. Name"
+    ):
+        found_or_followed(tmp_path)
+    with pytest.raises(InputError, match=r"nowhere: expected the folder of a target's fit, .* found no such folder"):
+        found_or_followed(tmp_path / "nowhere")
+    (tmp_path / "rig_0000").mkdir()
+    write_lights(tmp_path / "rig_0000/lights.json", RIGS[3])
+    with pytest.raises(InputError, match="found fits of rig_0000"):
+        found_or_followed(tmp_path)
+
+
+def test_suns_have_no_place_on_the_way() -> None:
+    """They stand nowhere: their line would join where they are drawn."""
+    rigs = [(SunLight([0.0, 0.0, 0.0], 1.0, [0.1 * index, 0.0, -1.0]), *rig) for index, rig in enumerate(RIGS)]
+    [way] = ways(rigs)
+    assert way[:, 0] == pytest.approx([0.1 * index for index in range(11)])
 
 
 def test_what_the_stage_wrote_is_shown_frame_by_frame(tmp_path: Path) -> None:

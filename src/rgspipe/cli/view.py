@@ -69,14 +69,14 @@ def view_folder(arguments: Sequence[str]) -> int:
     from rgspipe.stages.sources import check_target
     from rgspipe.viewer.material import Case, case_in
     from rgspipe.viewer.serve import view
-    from rgspipe.viewer.tracks import found_or_followed
+    from rgspipe.viewer.tracks import found_or_followed, shown_in
 
     device = chosen_device(asked.device)
     if asked.target is not None:
         check_target(asked.target)
     found = None if asked.fit is None else found_or_followed(asked.fit)
     given = [] if asked.lights is None else [Path(asked.lights)]
-    given += [] if asked.fit is None else [Path(asked.fit) / "lights.json"]
+    given += [] if asked.fit is None else [shown_in(asked.fit)]
     for line in filter(None, (elsewhere_line(file, Path(asked.folder) / SURFELS) for file in given)):
         print(line)
     unknowns = {} if found is None else found.unknowns

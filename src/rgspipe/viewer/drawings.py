@@ -60,17 +60,21 @@ class Drawings:
         self._eye: Camera | None = None
 
     def lamps(self, found: Found | None, truth: LightRig) -> None:
-        """Regions of the lamps that were found, the way to them, what they were weighed against, and true lamps."""
+        """Regions of the lamps that were found, the way to them, what they were weighed against, and true lamps.
+
+        Suns stand nowhere, so that nothing is drawn of them.
+        """
         _clear(self._lamps)
         scene, size = self._scene, self._size
         if found is not None:
             for index, (light, covariance) in enumerate(zip(found.lights, found.covariance, strict=False)):
-                mesh = region(light.position, covariance, size)
-                self._lamps.append(scene.add_mesh_simple(f"/found/{index}", *mesh, color=_FOUND, opacity=0.5))
+                if not light.distant:
+                    mesh = region(light.position, covariance, size)
+                    self._lamps.append(scene.add_mesh_simple(f"/found/{index}", *mesh, color=_FOUND, opacity=0.5))
             self._lamps += [self._way(index, way) for index, way in enumerate(ways(found.path))]
             for index, other in enumerate(found.alternatives, start=1):
                 self._lamps += self._other(index, other)
-            for index, light in enumerate(truth):
+            for index, light in enumerate(light for light in truth if not light.distant):
                 place = tuple(light.position.tolist())
                 self._lamps.append(scene.add_icosphere(f"/truth/{index}", TRUTH * size, _TRUE, position=place))
 
@@ -146,12 +150,13 @@ class Drawings:
 
 
 def ways(path: Sequence[LightRig]) -> list[np.ndarray]:
-    """(steps, 3) places of each lamp on a way, as far as it had as many lamps as at last."""
+    """(steps, 3) places of each lamp but suns on a way, as far as it had as many lamps as at last."""
     end = next((rig for rig in reversed(path) if rig), ())
     kept = [rig for rig in path if len(rig) == len(end)]
     if len(kept) < 2:
         return []
-    return [np.array([rig[index].position.tolist() for rig in kept]) for index in range(len(end))]
+    placed = [index for index, light in enumerate(end) if not light.distant]
+    return [np.array([rig[index].position.tolist() for rig in kept]) for index in placed]
 
 
 def _clear(drawn: list) -> None:

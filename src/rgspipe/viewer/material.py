@@ -25,6 +25,9 @@ from rgspipe.fitting.result_text import as_text, headline, light_lines
 from rgspipe.fitting.words import told_alternative
 from rgspipe.scene import Camera, LightRig
 
+#: The light file in the folder of a target's fit.
+LIGHTS = "lights.json"
+
 #: Of photographs of which only some are known with the lamps off.
 HALF_KNOWN = "Lamps cannot be looked for here: only some of the photographs are there with the lamps off, too."
 
@@ -182,8 +185,8 @@ def found_in(fit: str | Path) -> Found:
     Raises:
         InputError: it has no lights, as the folder of all fits, or they cannot be read.
     """
-    path = Path(fit) / "lights.json"
-    if not path.exists() and (fits := sorted(file.parent.name for file in Path(fit).glob("*/lights.json"))):
+    path = Path(fit) / LIGHTS
+    if not path.exists() and (fits := sorted(file.parent.name for file in Path(fit).glob(f"*/{LIGHTS}"))):
         found, remedy = f"fits of {', '.join(fits)}", f"Name one of them: {Path(fit) / fits[0]}."
         raise InputError(fit, expected="the folder of one target's fit", found=found, remedy=remedy)
     lights, told = read_lights(path), read_json(path, "a fit's light file")

@@ -27,7 +27,7 @@ from rgspipe.viewer.section import CutCamera
 PICTURE, IRRADIANCE, ILLUMINANCE = "picture", "irradiance, W/m²", "illuminance, lux"
 SHOWN = (PICTURE, IRRADIANCE, ILLUMINANCE)
 
-#: Two answers are one where their lamps are no farther apart, of the scene's size.
+#: Two answers are one where their lamps are no farther apart, of the scene's size; suns by the angle [rad].
 SAME = 0.01
 
 #: How far from one another lamps are that are added one after the other, of the scene's size.
@@ -209,7 +209,7 @@ class Session:
                 others of then; elsewhere there are none, as those of then were weighed against another answer.
         """
         found, before = Found.of(result), self.found
-        if not searched and before is not None and alike(found.lights, before.lights, SAME * self.images.frozen.size):
+        if not searched and before is not None and alike(found.lights, before.lights, self.images.frozen.size):
             found = replace(found, alternatives=before.alternatives, costs=before.costs)
         self.found, self.ambient = found, found.ambient
         self.change(result.lights)
@@ -228,11 +228,12 @@ def same_lights(one: LightRig, other: LightRig) -> bool:
     return len(one) == len(other) and all(_fields(a) == _fields(b) for a, b in zip(one, other, strict=True))
 
 
-def alike(one: LightRig, other: LightRig, apart: float) -> bool:
-    """Whether two rigs are of the same kinds in the same order, each lamp at most so far from the other's."""
+def alike(one: LightRig, other: LightRig, size: float) -> bool:
+    """Whether two rigs in a scene of `size` are of the same kinds in the same order, each lamp near the other's."""
     if [light.kind for light in one] != [light.kind for light in other]:
         return False
-    return all(float((a.position - b.position).norm()) <= apart for a, b in zip(one, other, strict=True))
+    pairs = zip(one, other, strict=True)
+    return all(float((a.standing(size) - b.standing(size)).norm()) <= SAME * size for a, b in pairs)
 
 
 def _fields(light: Light) -> tuple:

@@ -6,16 +6,20 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from rgspipe.datasets.input_file import input_folder
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_lights
 from rgspipe.datasets.name_order import name_order
 from rgspipe.errors import InputError
 from rgspipe.fitting.tracking.frame import TrackedFrame
 from rgspipe.scene import LightRig
-from rgspipe.viewer.material import Found, found_in
+from rgspipe.viewer.material import LIGHTS, Found, found_in
 
 #: The folder of a track has this folder of light files.
 FRAMES = "frames"
+
+#: What can be shown.
+EXPECTED = f"the folder of a target's fit, with {LIGHTS}, or of a track, with {FRAMES}/"
 
 
 def found_or_followed(folder: str | Path) -> Found:
@@ -24,8 +28,19 @@ def found_or_followed(folder: str | Path) -> Found:
     Raises:
         InputError: it has no lights, or they cannot be read.
     """
+    place = input_folder(folder, EXPECTED)
+    if (place / FRAMES).is_dir():
+        return track_in(place / FRAMES)
+    if not (place / LIGHTS).exists() and not any(place.glob(f"*/{LIGHTS}")):
+        remedy = "Name a target's folder of outputs/<scene>/fit_light/latest, or outputs/<scene>/track/latest."
+        raise InputError(folder, expected=EXPECTED, found="neither", remedy=remedy)
+    return found_in(place)
+
+
+def shown_in(folder: str | Path) -> Path:
+    """The light file of the folder of a target's fit, or the light files of that of a track."""
     frames = Path(folder) / FRAMES
-    return track_in(frames) if frames.is_dir() else found_in(folder)
+    return frames if frames.is_dir() else Path(folder) / LIGHTS
 
 
 def track_in(folder: Path) -> Found:
