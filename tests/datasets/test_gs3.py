@@ -215,7 +215,6 @@ def _transparent(path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "spoil", "message"),
     [
-        ("r_0000", lambda path: path.unlink(), "no such file"),
         ("r_0000", lambda path: path.write_bytes(path.read_bytes()[:-40]), "whole OpenEXR"),
         ("r_0000", lambda path: path.write_text("no image"), "whole OpenEXR"),
         ("r_0000", lambda path: _fill(path, "RGBA", float("nan")), "NaN or infinity"),
@@ -466,3 +465,23 @@ def test_targets_that_no_list_names_go_by_the_numbers_in_their_names(dataset: Pa
     for name in ("frame_10", "frame_1", "3", "frame"):
         shutil.copytree(dataset / "targets/frame_2", dataset / "targets" / name)
     assert [path.name for path in target_folders(dataset)] == ["3", "frame", "frame_1", "frame_2", "frame_10"]
+
+
+def test_all_images_that_are_missing_are_told_at_once(dataset: Path, change: Change) -> None:
+    """The first was named alone, and its path was to be checked."""
+    change(TRAIN, lambda content: content["frames"].append(content["frames"][0] | {"file_path": "train/r_0001"}))
+    (dataset / "train/r_0000_depth.exr").unlink()
+    words = (
+        r"transforms_train\.json: .*r_0000_depth\.exr.*r_0001\.exr.*no such file \(2 of 2 frames\).*take these frames"
+    )
+    with pytest.raises(InputError, match=words):
+        load_dataset(dataset)
+
+
+def test_views_that_are_held_out_and_trained_on_are_refused(dataset: Path, change: Change) -> None:
+    """The scene was judged by what it had been made of."""
+    change("transforms_test.json", lambda content: content["frames"][0].update(file_path="./test/../train/r_0000"))
+    words = r"transforms_test\.json: frames\[0\]\.file_path: .*r_0000\.exr, which transforms_train\.json has, too"
+    with pytest.raises(InputError, match=words):
+        load_dataset(dataset)
+    assert load_dataset(dataset, test=False).train

@@ -28,7 +28,9 @@ def test_a_file_that_is_missing_is_named_with_what_to_do(tmp_path: Path, what: s
     """The error was to check the path; frames had to be taken out by hand, of COLMAP's binary files by a program."""
     write_nerfstudio(tmp_path, photographed(5, 8))
     (tmp_path / what).unlink()
-    with pytest.raises(InputError, match=rf"transforms\.json.*1 of 5.*{what}.*Copy.*missing='leave_out'"):
+    with pytest.raises(
+        InputError, match=rf"transforms\.json.*{what}: no such file \(1 of 5 .*Copy.*missing='leave_out'"
+    ):
         read_scan(tmp_path, ScanOptions())
     scan = read_scan(tmp_path, LEAVE_OUT)
     assert [frame.image.stem for frame in scan.frames] == ["0", "1", "3", "4"]
@@ -41,7 +43,7 @@ def test_all_that_is_missing_is_told_at_once(tmp_path: Path) -> None:
     images = sorted((tmp_path / "images").iterdir())
     for path in images[:5]:
         path.unlink()
-    with pytest.raises(InputError, match=rf"5 of 8 .*{images[0].name}, .*{images[2].name}, ….*Copy"):
+    with pytest.raises(InputError, match=rf"{images[0].name}, .*{images[2].name}, …: no such file \(5 of 8 .*Copy"):
         read_scan(tmp_path, ScanOptions())
     scan = read_scan(tmp_path, LEAVE_OUT)
     assert len(scan.frames) == 3 and "5 photographs are left out" in scan.notes[-1]
@@ -50,7 +52,7 @@ def test_all_that_is_missing_is_told_at_once(tmp_path: Path) -> None:
 def test_a_mask_that_is_missing_does_not_make_all_of_its_photograph_count(tmp_path: Path) -> None:
     write_nerfstudio(tmp_path, SCANNED)
     masked(tmp_path)
-    with pytest.raises(InputError, match=r"1 of 2 .*mask\.png"):
+    with pytest.raises(InputError, match=r"mask\.png: no such file \(1 of 2"):
         read_scan(tmp_path, ScanOptions())
     assert len(read_scan(tmp_path, LEAVE_OUT).frames) == 1
 
@@ -68,5 +70,5 @@ def test_a_capture_of_which_nothing_is_there_is_refused(tmp_path: Path) -> None:
     write_nerfstudio(tmp_path, SCANNED)
     for path in (tmp_path / "images").iterdir():
         path.unlink()
-    with pytest.raises(InputError, match=r"expected photographs whose files are there, found all 2 without"):
+    with pytest.raises(InputError, match=r"expected photographs whose files are there, found .*all 2 photographs"):
         read_scan(tmp_path, LEAVE_OUT)

@@ -12,7 +12,7 @@ from pathlib import Path
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.completion import FLAGS as COMPLETION_FLAGS
 from rgspipe.cli.completion import answered
-from rgspipe.cli.help import help_text, version_text
+from rgspipe.cli.help import help_text, topics, version_text
 from rgspipe.cli.messages import EXIT_INPUT, EXIT_INTERRUPTED, EXIT_UNREAD, show_input_error
 from rgspipe.errors import InputError
 from rgspipe.graph.resolver import StageLoader
@@ -155,6 +155,9 @@ def _check_options(arguments: Sequence[str]) -> None:
         if name.startswith("-") and name not in known:
             near = difflib.get_close_matches(name, known, n=1)
             remedy = f"Did you mean {near[0]}?" if near else f"{typed('--help', 'options')} lists them."
+            setting = name.lstrip("-").replace("-", "_")
+            if setting.partition(".")[0] in ("stage", "pipeline", *topics()):
+                remedy = f"Write {setting}={text.partition('=')[2] or 'VALUE'}, without dashes."
             raise InputError(repr(name), expected="an option", found="none of this name", remedy=remedy)
 
 

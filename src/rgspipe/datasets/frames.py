@@ -8,6 +8,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from rgspipe.datasets.frame_keys import check_frames
 from rgspipe.datasets.image_names import SUFFIXES, image_named
 from rgspipe.datasets.input_file import is_plain_name
 from rgspipe.datasets.json_file import is_number, numbers, read_json, required, shown
@@ -283,7 +284,7 @@ def read_entries(path: Path, what: str) -> list[FrameEntry]:
     """The frames of a transforms file, at least one.
 
     Raises:
-        InputError: no such file, not JSON, or no frames.
+        InputError: no such file, not JSON, no frames, or keys that were meant to be others.
     """
     content = read_json(path, what)
     frames = required(content, "frames", path)
@@ -291,9 +292,6 @@ def read_entries(path: Path, what: str) -> list[FrameEntry]:
         raise InputError(
             path, expected='at least one frame under "frames"', found="none", remedy="Add frames with their images."
         )
-    for index, frame in enumerate(frames):
-        if not isinstance(frame, dict):
-            place = f"{path}: frames[{index}]"
-            raise InputError(place, expected="a JSON object", found=repr(frame)[:80], remedy="Correct it.")
+    check_frames(frames, path)
     shared = {key: value for key, value in content.items() if key != "frames"}
     return [FrameEntry(path, index, frame, shared) for index, frame in enumerate(frames)]

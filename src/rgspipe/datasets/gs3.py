@@ -6,6 +6,7 @@ broken, missing or ambiguous gets past this module.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from rgspipe.datasets.images import read_colour, read_depth, read_mask, read_vec
 from rgspipe.datasets.info import INFO, DatasetInfo, read_info
 from rgspipe.datasets.input_file import input_folder, is_plain_name
 from rgspipe.datasets.json_file import read_json, required, shown
+from rgspipe.datasets.missing_files import missing_of, named
 from rgspipe.datasets.name_order import name_order
 from rgspipe.datasets.saturation import with_saturation
 from rgspipe.datasets.tensoir import is_tensoir, load_tensoir
@@ -50,8 +52,23 @@ def load_dataset(root: str | Path, *, train: bool = True, test: bool = True, tar
         return load_tensoir(root, train=train, test=test)
     info = read_info(root)
     splits = {"train": train, "test": test and (root / TEST).exists()}
+    if all(splits.values()):
+        _check_held_out(root)
     loaded = {name: load_split(root, name, info) if wanted else () for name, wanted in splits.items()}
     return Dataset(root, loaded["train"], loaded["test"], _load_targets(root) if targets else ())
+
+
+def _check_held_out(root: Path) -> None:
+    """Refuse views that are held out and trained on: they would flatter the scene."""
+    trained = {os.path.normpath(entry.image_path) for entry in split_entries(root, "train")}
+    for entry in split_entries(root, "test"):
+        if os.path.normpath(entry.image_path) in trained:
+            raise InputError(
+                f"{entry.where}.file_path",
+                expected="views that are held out, which the scene is judged by",
+                found=f"{entry.image_path}, which transforms_train.json has, too",
+                remedy="Take its frame out of one of the two files.",
+            )
 
 
 def load_split(root: Path, split: str, info: DatasetInfo | None) -> tuple[View, ...]:
@@ -81,12 +98,26 @@ def load_entries(entries: list[FrameEntry], root: Path, split: str, info: Datase
     Raises:
         InputError: a file is missing, broken or inconsistent, or images under known lights state other exposures.
     """
+    _refuse_missing(entries)
     lit = any(entry.names_light for entry in entries)
     reading = progress_bar(entries, f"reading {split} views", unit="view")
     views = [_load_view(entry, root, info, light=lit, depth=True) for entry in reading]
     if lit:
         check_exposures([(view.name, view.exposure) for view in views], root / f"transforms_{split}.json", EXPOSE_ALIKE)
     return with_saturation(entries, views)
+
+
+def _refuse_missing(entries: list[FrameEntry]) -> None:
+    """Refuse frames whose files are not all there, all of them at once."""
+    lacking = [paths for entry in entries if (paths := missing_of(entry.files))]
+    if lacking:
+        count = f"{len(lacking)} of {len(entries)} frames"
+        raise InputError(
+            entries[0].transforms_path,
+            expected="all images of its frames",
+            found=f"{named([path for paths in lacking for path in paths])}: no such file ({count})",
+            remedy="Check the paths, copy the images there, or take these frames out of the file.",
+        )
 
 
 def load_target(folder: str | Path, base: str | Path | None = None) -> Target:

@@ -1,4 +1,4 @@
-"""Photographs that a capture lists and that are not all there, as after a copy that was cut off."""
+"""Photographs of a capture whose files are not all there."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from rgspipe.datasets.missing_files import missing_of, named
 from rgspipe.datasets.scans.frame import Scan, ScanFrame
 from rgspipe.errors import InputError
-
-#: Files that are named.
-NAMED = 3
 
 
 def refuse_missing(scan: Scan) -> None:
@@ -19,14 +17,11 @@ def refuse_missing(scan: Scan) -> None:
     Raises:
         InputError: naming some of them, and how to go on without.
     """
-    lacking = [frame for frame in scan.frames if _missing(frame)]
+    lacking = _lacking(scan)
     if lacking:
-        raise InputError(
-            scan.stated,
-            expected="all files of its photographs",
-            found=f"{len(lacking)} of {len(scan.frames)} whose files are not all there: no {_named(lacking)}",
-            remedy="Copy them there, or go on without these photographs: ScanOptions(missing='leave_out').",
-        )
+        found = f"{named(_files(lacking))}: no such file ({len(lacking)} of {len(scan.frames)} photographs)"
+        remedy = "Copy them there, or go on without these photographs: ScanOptions(missing='leave_out')."
+        raise InputError(scan.stated, expected="all files of its photographs", found=found, remedy=remedy)
 
 
 def without_missing(scan: Scan) -> Scan:
@@ -35,34 +30,22 @@ def without_missing(scan: Scan) -> Scan:
     Raises:
         InputError: that is none.
     """
-    lacking = [frame for frame in scan.frames if _missing(frame)]
+    lacking = _lacking(scan)
     if not lacking:
         return scan
-    if len(lacking) == len(scan.frames):
-        found = f"all {len(lacking)} without: no {_named(lacking)}"
+    count, files = len(lacking), named(_files(lacking))
+    if count == len(scan.frames):
+        found = f"{files}: no such file (all {count} photographs)"
         raise InputError(scan.stated, expected="photographs whose files are there", found=found, remedy="Copy them.")
-    count = len(lacking)
-    photographs = f"{count} photograph{'s' * (count != 1)} {'are' if count != 1 else 'is'} left out"
-    note = f"{photographs}, of which a file is missing: {_named(lacking)}"
-    kept = tuple(frame for frame in scan.frames if not _missing(frame))
+    are = "photographs are" if count > 1 else "photograph is"
+    note = f"{count} {are} left out, of which a file is missing: {files}"
+    kept = tuple(frame for frame in scan.frames if not missing_of(frame.files))
     return replace(scan, frames=kept, notes=(*scan.notes, note))
 
 
-def _missing(frame: ScanFrame) -> list[Path]:
-    return [path for path in frame.files if _is_missing(path)]
+def _lacking(scan: Scan) -> list[ScanFrame]:
+    return [frame for frame in scan.frames if missing_of(frame.files)]
 
 
-def _is_missing(path: Path) -> bool:
-    """Whether there is no such file; names that no file can have are told where they are read."""
-    try:
-        path.stat()
-    except FileNotFoundError:
-        return True
-    except (OSError, ValueError):
-        return False
-    return False
-
-
-def _named(frames: Sequence[ScanFrame]) -> str:
-    missing = [str(path) for frame in frames for path in _missing(frame)]
-    return ", ".join(missing[:NAMED]) + (", …" if len(missing) > NAMED else "")
+def _files(frames: Sequence[ScanFrame]) -> list[Path]:
+    return [path for frame in frames for path in missing_of(frame.files)]
