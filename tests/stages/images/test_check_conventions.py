@@ -32,7 +32,6 @@ def _written(root: Path, meant: Reading, convention: str = "planar_z") -> Path:
         write_channels(root / f"{name}_depth.exr", {"Z": stored.numpy()})
         entries.append(frame_entry(name, view.camera, light, ("depth",)))
     write_transforms(root / "transforms_train.json", entries)
-    write_transforms(root / "transforms_test.json", entries[:1])
     write_info(root, "room", [[-0.5] * 3, [0.5] * 3], 1.0, [0.0] * 3)
     info = json.loads((root / "dataset_info.json").read_text())
     (root / "dataset_info.json").write_text(json.dumps(info | {"depth_convention": convention}))
