@@ -15,6 +15,7 @@ from plyfile import PlyData
 
 from clouds import cloud
 from rgspipe.datasets.ply.file import PlyOptions, save_ply
+from rgspipe.datasets.ply.table import read_vertices
 from rgspipe.errors import InputError
 from rgspipe.renderer.ply import load_ply
 from rgspipe.scene import NO_CLIP, Coverage, Gloss, Surfels
@@ -149,3 +150,11 @@ def test_a_damaged_comment_is_refused(tmp_path: Path, old: bytes, new: bytes, wo
 def test_radiance_of_another_scene_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"radiance: expected numbers of shape \(5, 3\)"):
         save_ply(tmp_path / "s.ply", cloud(5, 0), radiance=torch.zeros(4, 3))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_number_that_no_float_holds_is_refused_without_a_warning(tmp_path: Path) -> None:
+    path = tmp_path / "text.ply"
+    path.write_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1e60\n")
+    with pytest.raises(InputError, match="property x: expected finite numbers"):
+        read_vertices(path).columns("x")

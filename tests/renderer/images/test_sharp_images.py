@@ -243,6 +243,9 @@ def test_the_dark_is_black(frozen: FrozenScene, glossy: FrozenScene) -> None:
 def test_nothing_to_see_is_black_under_every_light(surfels: Surfels) -> None:
     nothing = {name: tensor[:0] for name, tensor in surfels.tensors().items()}
     empty = FrozenScene.freeze(replace(surfels, **nothing), gather_rays=4, patches=4)
+    # It is told once, as the view is kept.
+    with pytest.warns(UserWarning, match="The camera sees nothing"):
+        assert not bool(empty.render(CAMERA, ()).any())
     for light in LIGHTS.values():
         moving, leaves = with_leaves(light)
         image = empty.render(CAMERA, moving)

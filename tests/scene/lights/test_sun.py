@@ -36,9 +36,9 @@ def test_a_grazing_sun_is_finite_with_its_derivative(cube: FrozenScene, elevatio
     axis = torch.tensor([math.cos(elevation), 0.0, -math.sin(elevation)], dtype=torch.float64, requires_grad=True)
     lit = rig_irradiance(cube.bvh, (SunLight([0.0, 0.0, 0.0], 1.0, axis),))
     top = cube.bvh.surfels.normals[:, 2] > 0.5
-    assert float(lit[top].max()) == pytest.approx(max(0.0, math.sin(elevation)), rel=1e-5, abs=1e-9)
+    assert float(lit[top].detach().max()) == pytest.approx(max(0.0, math.sin(elevation)), rel=1e-5, abs=1e-9)
     lit.sum().backward()
-    assert bool(torch.isfinite(axis.grad).all()) and float(lit.min()) >= 0.0
+    assert bool(torch.isfinite(axis.grad).all()) and bool((lit >= 0.0).all())
 
 
 @pytest.mark.parametrize("glossy", [False, True])

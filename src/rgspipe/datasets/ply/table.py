@@ -115,7 +115,8 @@ def read_vertices(path: str | Path) -> VertexTable:
     path = input_file(path, "a PLY file")
     check_header(path)
     try:
-        content = PlyData.read(str(path), mmap="r")
+        with np.errstate(over="ignore"):  # numbers of a text that no float holds are infinite, which is refused
+            content = PlyData.read(str(path), mmap="r")
     # The library lets errors of numpy and of decoding through.
     except (PlyParseError, OSError, ValueError, TypeError, KeyError, OverflowError, MemoryError) as error:
         why = str(error).splitlines()[0] if str(error) else type(error).__name__
