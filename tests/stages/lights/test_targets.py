@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
-import torch
 
-from raycast import room_views
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.datasets.gs3_write import write_target_list
 from rgspipe.errors import InputError
 from rgspipe.stages.lights import fit_light
-from rgspipe.stages.lights.targets import known_targets, masked_out
+from rgspipe.stages.lights.targets import known_targets
 from rgspipe.stages.report import report
 from tiny_dataset import write_tiny_dataset
 
@@ -50,16 +47,3 @@ def test_targets_of_another_class_do_not_count(config: RgspipeConfig, tmp_path: 
         known_targets(config)
     # Targets that are made here are not on disk yet.
     assert known_targets(with_changes(config, {"fit.targets": "generated"})) == []
-
-
-def test_masks_that_leave_most_of_the_scene_out_are_told() -> None:
-    """Masks that are the wrong way round passed without a word; those of a thing before nothing leave nothing out."""
-    kept = torch.ones(12, 12)
-    kept[:3] = 0.0
-    views = [replace(view, alpha=kept) for view in room_views(2, 12)]
-    everywhere = [torch.ones(144)] * 2
-    assert masked_out("evening", views, everywhere) == ""
-    inverted = [replace(view, alpha=1.0 - kept) for view in views]
-    line = masked_out("evening", inverted, everywhere)
-    assert line.startswith("target evening: masks or alpha leave out 75 % of what the scene shows")
-    assert masked_out("evening", inverted, [(1.0 - kept).reshape(-1)] * 2) == ""

@@ -34,16 +34,9 @@ from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.lights.capture import KEYS as CAPTURE_KEYS
 from rgspipe.stages.lights.capture import captured_views, known_emitters
 from rgspipe.stages.lights.extras import Named, further_files, training_cameras
+from rgspipe.stages.lights.masks import masked_out
 from rgspipe.stages.lights.spec import light_keys, light_spec, table_files
-from rgspipe.stages.lights.targets import (
-    all_targets,
-    masked_out,
-    require_views,
-    select_targets,
-    target_seed,
-    used_views,
-    view_keys,
-)
+from rgspipe.stages.lights.targets import all_targets, require_views, select_targets, target_seed, used_views, view_keys
 from rgspipe.stages.scene.effects import chosen_effects, effect_keys, frozen_scene, wanted_effects
 from rgspipe.stages.sources import check_target, image_stage, require_images, target_stage
 from rgspipe.store.artifacts import Artifact

@@ -6,8 +6,6 @@ import zlib
 from collections.abc import Sequence
 from typing import Protocol, TypeVar
 
-from torch import Tensor
-
 from rgspipe.config import RgspipeConfig
 from rgspipe.datasets.gs3 import TargetFolder, load_target, target_folders
 from rgspipe.datasets.location import open_dataset
@@ -15,9 +13,6 @@ from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
 from rgspipe.stages.base import StageContext
 from rgspipe.stages.sources import target_stage
-
-#: Masks that leave out more than this part of what the scene shows may be the wrong way round.
-MOSTLY = 0.5
 
 #: Number of the random stream of fits; part of the seed, so never renumber it.
 STREAM = 0
@@ -120,26 +115,6 @@ def used_indices(target: str, views: int, config: RgspipeConfig) -> list[int]:
             remedy="Ask for fewer views, or add images to the target.",
         )
     return list(indices)
-
-
-def masked_out(target: str, views: Sequence[View], coverages: Sequence[Tensor]) -> str:
-    """A line about masks that leave out most of what the scene shows, as those that are the wrong way round.
-
-    Args:
-        coverages: (P,) of each view, by the scene's surfels.
-    """
-    left_out = shown = 0
-    for view, coverage in zip(views, coverages, strict=True):
-        seen = coverage.reshape(-1).cpu() >= 0.5
-        left_out += int((seen & (view.alpha.reshape(-1) < 0.5)).sum())
-        shown += int(seen.sum())
-    share = left_out / max(shown, 1)
-    if share <= MOSTLY:
-        return ""
-    return (
-        f"target {target}: masks or alpha leave out {100 * share:.0f} % of what the scene shows in its images. What is "
-        "black in a mask does not count: if it is meant the other way round, invert the masks."
-    )
 
 
 def view_keys(config: RgspipeConfig) -> list[str]:
