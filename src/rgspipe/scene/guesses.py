@@ -6,16 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from torch import Tensor
 
+from rgspipe.scene.smooth_ways import TOGETHER, TURNED, SmoothWays
 from rgspipe.scene.spacing import surfel_spacing
 from rgspipe.scene.surfels import Surfels
-
-#: Surfels no farther apart than so many of their distances, and turned by less than 45°, are of one surface.
-TOGETHER, TURNED = 2.0, 0.7
 
 #: Surfaces that are doubted on their own, the largest; all others are doubted together, as none of them does much.
 MOST = 15
@@ -25,6 +21,12 @@ FLAT = 0.9
 
 #: Seen surfels in the plane of a guessed surface, over its own, from which on they tell what it is like.
 KIN = 0.1
+
+#: What tells a guessed surface's albedo.
+PLANE, BENT, SIDES = "plane", "bent", "sides"
+
+#: Degrees of freedom of Student's t, and rounds by which its scale is found.
+FREEDOM, ROUNDS = 4.0, 30
 
 #: No guess is better than this: in white rooms whose walls are all alike, guesses were 0.05 to 0.06 off.
 LEAST_DOUBT = 0.05
@@ -61,12 +63,7 @@ def guessed_surfaces(surfels: Surfels) -> Tensor:
 
 def labels_of_guesses(surfels: Surfels) -> Tensor:
     """(N,) int64 number of the guessed surface that a surfel belongs to; −1 for those that cameras saw."""
-    own = (surfels.guessed > 0.0).nonzero()[:, 0]
-    labels = torch.full((len(surfels),), -1, device=own.device)
-    if len(own):
-        found = _together(surfels.centers[own].double().cpu(), surfels.normals[own].double().cpu(), _spacing(surfels))
-        labels[own] = found.to(own.device)
-    return labels
+    return GuessedSurfaces.of(surfels).labels
 
 
 @dataclass(frozen=True)
@@ -75,37 +72,44 @@ class GuessedSurfaces:
 
     Attributes:
         labels: (N,) int64, as of `labels_of_guesses`.
-        kin: for each of the surfaces the surfels (K,) int64 that cameras saw in its plane; where fewer are seen than
-            KIN of what is guessed, those of the thing's other sides that it touches. None where it is bent: guesses on
-            two things that are sunk into each other may be one bent surface.
-        in_plane: for each of them which it is.
+        kin: for each of the surfaces the surfels (K,) int64 that cameras saw of what it goes on from.
+        kinship: for each of them what these are. PLANE: seen in its plane, at least KIN of what is guessed. BENT: of
+            the smooth surface that goes out of sight in it, as far back as it goes on. SIDES: of the thing's other
+            sides, which a flat one touches.
         edges: (E, 2) int64 surfels that cameras saw on both sides of edges of things.
     """
 
     labels: Tensor
     kin: tuple[Tensor, ...]
-    in_plane: tuple[bool, ...]
+    kinship: tuple[str, ...]
     edges: Tensor
 
     @classmethod
     def of(cls, surfels: Surfels) -> GuessedSurfaces:
         """Those of surfels that know which of them are guessed."""
-        labels = labels_of_guesses(surfels)
         centers, normals, spacing = surfels.centers.double(), surfels.normals.double(), _spacing(surfels)
-        seen, kin, in_plane = surfels.guessed == 0.0, [], []
+        seen = surfels.guessed == 0.0
+        labels = torch.full((len(surfels),), -1, device=centers.device)
         convex = _edges_of_things(centers, normals, spacing)
-        near = torch.cat([convex, convex.flip(1)])
-        for label in range(int(labels.max()) + 1):
-            own = labels == label
-            normal = normals[own].mean(dim=0)
-            flat, normal = float(normal.norm()) > FLAT, normal / normal.norm().clamp(min=1e-12)
-            height = (centers - centers[own].mean(dim=0)) @ normal
-            alike = seen & (height.abs() <= spacing) & (normals @ normal > FLAT)
-            enough = flat and int(alike.sum()) >= KIN * int(own.sum())
-            sides = near[own[near[:, 0]] & seen[near[:, 1]], 1].unique()
-            kin.append(alike.nonzero()[:, 0] if enough else sides if flat else labels[:0])
-            in_plane.append(enough)
-        return cls(labels, tuple(kin), tuple(in_plane), convex[seen[convex].all(dim=1)])
+        edges = convex[seen[convex].all(dim=1)]
+        if bool(seen.all()):
+            return cls(labels, (), (), edges)
+        ways = SmoothWays.among(centers.cpu().numpy(), normals.cpu().numpy(), spacing)
+        beyond = _OutOfSight.of(ways, seen.cpu().numpy())
+        near, kin, kinship = torch.cat([convex, convex.flip(1)]), [], []
+        for own in _groups(ways.surfaces((~seen).cpu().numpy()), ~seen):
+            alike = seen & _in_plane_of(own, centers, normals, spacing)
+            if int(alike.sum()) >= KIN * int(own.sum()):
+                parts = [(own, alike.nonzero()[:, 0], PLANE)]
+            elif float(normals[own].mean(dim=0).norm()) > FLAT:
+                parts = [(own, near[own[near[:, 0]] & seen[near[:, 1]], 1].unique(), SIDES)]
+            else:
+                parts = [(part, of_part, BENT) for part, of_part in beyond.parts(own)]
+            for part, of_part, how in parts:
+                labels[part] = len(kin)
+                kin.append(of_part)
+                kinship.append(how)
+        return cls(labels, tuple(kin), tuple(kinship), edges)
 
     def expected(self, albedo: Tensor) -> tuple[Tensor, Tensor]:
         """(N, 3) albedo that guessed surfels should have if others have `albedo` (N, 3), the median of their kin, and
@@ -113,17 +117,92 @@ class GuessedSurfaces:
         much as sides of things differ that were seen. NaN where there are none, and where seen."""
         found = torch.full_like(albedo, torch.nan)
         doubt = torch.full_like(albedo[:, :1], torch.nan)
-        for label, (kin, in_plane) in enumerate(zip(self.kin, self.in_plane, strict=True)):
-            if len(kin) and (in_plane or len(self.edges)):
+        grey = albedo.mean(dim=1).clamp(min=1e-3).log()
+        for label, (kin, kinship) in enumerate(zip(self.kin, self.kinship, strict=True)):
+            if len(kin) and (kinship != SIDES or len(self.edges)):
                 own = self.labels == label
                 found[own] = albedo[kin].median(dim=0).values
-                doubt[own] = _spread(albedo[kin]) if in_plane else self._across_edges(albedo)
+                variance = grey[kin].var(correction=0)
+                if kinship == SIDES:
+                    variance = variance + self._across_edges(grey)
+                if kinship == BENT:
+                    variance = (FREEDOM * self._along_bends(grey) + len(kin) * variance) / (FREEDOM + len(kin))
+                doubt[own] = variance.sqrt().clamp(min=LEAST_DOUBT)
         return found, doubt
 
-    def _across_edges(self, albedo: Tensor) -> Tensor:
-        """() root mean square of what the logarithm of albedo (N, 3) differs by from side to side of seen things."""
-        grey = albedo.mean(dim=1).clamp(min=1e-3).log()[self.edges]
-        return (grey[:, 0] - grey[:, 1]).square().mean().sqrt().clamp(min=LEAST_DOUBT)
+    def _along_bends(self, grey: Tensor) -> Tensor:
+        """() variance of logarithms of albedo (N,) along bent surfaces that go out of sight."""
+        bends = [grey[kin] for kin, kinship in zip(self.kin, self.kinship, strict=True) if kinship == BENT]
+        return torch.cat([logs - logs.mean() for logs in bends if len(logs)]).square().mean()
+
+    def _across_edges(self, grey: Tensor) -> Tensor:
+        """() square of the scale of Student's t of what logarithms of albedo (N,) differ by from side to side.
+
+        Most things are of one paint, and a few black beside white: these alone would make a root mean square.
+        """
+        return likely_scale(grey[self.edges[:, 0]] - grey[self.edges[:, 1]]).square()
+
+
+def likely_scale(differences: Tensor) -> Tensor:
+    """() that of Student's t around 0 with FREEDOM degrees by which differences (D,) are likeliest (EM)."""
+    squares = differences.double().square()
+    scale = squares.mean()
+    for _ in range(ROUNDS):
+        scale = ((FREEDOM + 1.0) * squares / (FREEDOM + squares / scale.clamp(min=1e-12))).mean()
+    return scale.sqrt().to(differences)
+
+
+def _groups(surfaces: np.ndarray, chosen: Tensor) -> list[Tensor]:
+    """(N,) bool each: the `chosen` (N,) surfels of one of the `surfaces` (N,)."""
+    numbers = torch.from_numpy(surfaces).to(chosen.device)
+    return [chosen & (numbers == number) for number in numbers[chosen].unique()]
+
+
+def _in_plane_of(own: Tensor, centers: Tensor, normals: Tensor, spacing: float) -> Tensor:
+    """(N,) bool: the surfels in the plane of `own` (N,), none if these lie in none."""
+    normal = normals[own].mean(dim=0)
+    if float(normal.norm()) <= FLAT:
+        return torch.zeros_like(own)
+    normal = normal / normal.norm()
+    height = (centers - centers[own].mean(dim=0)) @ normal
+    return (height.abs() <= spacing) & (normals @ normal > FLAT)
+
+
+@dataclass(frozen=True)
+class _OutOfSight:
+    """How smooth surfaces go out of sight, among N surfels.
+
+    Attributes:
+        ways: along them.
+        seen: (N,) bool.
+        source: (N,) the surfel that was seen from which the way to one that was not is shortest, −1 if there is none.
+        length: (N,) of that way.
+        things: (N,) number of the smooth surface on which this source is, −1 likewise.
+    """
+
+    ways: SmoothWays
+    seen: np.ndarray
+    source: np.ndarray
+    length: np.ndarray
+    things: np.ndarray
+
+    @classmethod
+    def of(cls, ways: SmoothWays, seen: np.ndarray) -> _OutOfSight:
+        source, length = ways.sources(seen & ways.lead_to(seen))
+        return cls(ways, seen, source, length, np.where(source < 0, -1, ways.surfaces(seen)[source]))
+
+    def parts(self, own: Tensor) -> list[tuple[Tensor, Tensor]]:
+        """What of a guessed surface `own` (N,) goes on from each of those that were seen, and (K,) surfels of these.
+
+        So far back as it goes on.
+        """
+        found = []
+        for part in _groups(self.things, own):
+            chosen = part.cpu().numpy()
+            rim, reach = np.unique(self.source[chosen & (self.source >= 0)]), float(self.length[chosen].max())
+            kin = self.ways.within(rim, self.seen, reach)
+            found.append((part, torch.from_numpy(kin).to(own.device)))
+        return found
 
 
 def doubts_of_guesses(surfels: Surfels) -> Tensor:
@@ -135,7 +214,7 @@ def doubts_of_guesses(surfels: Surfels) -> Tensor:
     surfaces = GuessedSurfaces.of(surfels)
     _, doubt = surfaces.expected(surfels.albedo)
     labels = surfaces.labels
-    planes = torch.tensor([*surfaces.in_plane, False], device=labels.device)[labels]
+    planes = torch.tensor([*(kinship == PLANE for kinship in surfaces.kinship), False], device=labels.device)[labels]
     doubt = torch.where(planes, doubt[:, 0], spread_of_albedo(surfels))
     return torch.where(surfels.guessed > 0.0, doubt, 0.0)
 
@@ -156,12 +235,3 @@ def _edges_of_things(centers: Tensor, normals: Tensor, spacing: float) -> Tensor
     away, cosine = centers[second] - centers[first], (normals[first] * normals[second]).sum(dim=1)
     behind = ((away * normals[first]).sum(dim=1) < 0.0) & ((away * normals[second]).sum(dim=1) > 0.0)
     return pairs[(cosine.abs() <= TURNED) & behind]
-
-
-def _together(centers: Tensor, normals: Tensor, spacing: float) -> Tensor:
-    """(G,) int64 label of the surface that each of G surfels belongs to."""
-    pairs = torch.from_numpy(cKDTree(centers.numpy()).query_pairs(TOGETHER * spacing, output_type="ndarray"))
-    first, second = pairs[(normals[pairs[:, 0]] * normals[pairs[:, 1]]).sum(dim=1) > TURNED].T.numpy()
-    count = len(centers)
-    graph = coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count))
-    return torch.from_numpy(connected_components(graph, directed=False)[1]).long()

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.sparse import SparseOperator
-from rgspipe.scene.guesses import GuessedSurfaces
+from rgspipe.scene.guesses import FREEDOM, GuessedSurfaces
 from rgspipe.scene.surfels import Surfels
 
 
@@ -57,6 +57,8 @@ class Ties:
         Where nothing is expected the variance is infinite.
         """
         found, doubt = self._surfaces.expected(albedo)
-        variance = (doubt * found.mean(dim=1, keepdim=True)).square()
+        grey = found.mean(dim=1, keepdim=True)
+        away = (albedo.mean(dim=1, keepdim=True).clamp(min=1e-3) / grey.clamp(min=1e-3)).log()
+        variance = (FREEDOM * doubt.square() + away.square()) / (FREEDOM + 1.0) * grey.square()
         known = found.isfinite().all(dim=1, keepdim=True)
         return torch.where(known, found, 0.0), torch.where(known, variance, torch.inf)
