@@ -25,7 +25,7 @@ KIN = 0.1
 #: What tells a guessed surface's albedo.
 PLANE, BENT, SIDES = "plane", "bent", "sides"
 
-#: Degrees of freedom of Student's t, and rounds by which its scale is found.
+#: Degrees of freedom of Student's t, as in captures, and rounds by which its scale is found.
 FREEDOM, ROUNDS = 4.0, 30
 
 #: No guess is better than this: in white rooms whose walls are all alike, guesses were 0.05 to 0.06 off.
@@ -73,9 +73,9 @@ class GuessedSurfaces:
     Attributes:
         labels: (N,) int64, as of `labels_of_guesses`.
         kin: for each of the surfaces the surfels (K,) int64 that cameras saw of what it goes on from.
-        kinship: for each of them what these are. PLANE: seen in its plane, at least KIN of what is guessed. BENT: of
-            the smooth surface that goes out of sight in it, as far back as it goes on. SIDES: of the thing's other
-            sides, which a flat one touches.
+        kinship: for each of them what these are. PLANE: seen in its plane, at least KIN of what is guessed. SIDES: of
+            the thing's other sides, which a flat one touches. BENT: of what goes out of sight in a bent one, as far
+            back as it goes on; guesses on two things that are sunk into each other are parted by what is nearer.
         edges: (E, 2) int64 surfels that cameras saw on both sides of edges of things.
     """
 
@@ -113,8 +113,11 @@ class GuessedSurfaces:
 
     def expected(self, albedo: Tensor) -> tuple[Tensor, Tensor]:
         """(N, 3) albedo that guessed surfels should have if others have `albedo` (N, 3), the median of their kin, and
-        (N, 1) how much its logarithm is in doubt: in a plane as much as among these, and on another side of a thing as
-        much as sides of things differ that were seen. NaN where there are none, and where seen."""
+        (N, 1) how much its logarithm is in doubt: as much as these differ, and on another side of a thing what seen
+        sides do as well. NaN where there are none, and where seen.
+
+        Where a bend goes out of sight few may be seen of it: its variance is a draw of what all bends have in common,
+        of FREEDOM degrees of freedom."""
         found = torch.full_like(albedo, torch.nan)
         doubt = torch.full_like(albedo[:, :1], torch.nan)
         grey = albedo.mean(dim=1).clamp(min=1e-3).log()

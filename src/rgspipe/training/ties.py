@@ -1,4 +1,4 @@
-"""Surfaces that no camera saw, while the albedo is solved: each is of one colour, about that of its plane or thing."""
+"""Surfaces that no camera saw, while the albedo is solved: each is of one colour, about that of what it touches."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class Ties:
     """Each guessed surface has one albedo, each other surfel its own: N surfels, M ≤ N unknowns.
 
     What a guessed surface does to images it does by the light that it sends back, which hardly tells its parts apart;
-    each on its own they would end as black and white patches. One that goes on in the plane of surfaces that cameras
-    saw is expected to be like these, within their own spread, and another side of a thing to be like those that it
-    touches.
+    each on its own they would end as black and white patches. What it goes on from, in its plane, around a bend or
+    across an edge, is what it is expected to be like, within what these differ by. Most things are of one paint, and
+    what is expected of the others is far off: it is a draw of Student's t, and pulls less at what is far from it.
     """
 
     def __init__(self, surfels: Surfels) -> None:
@@ -54,7 +54,8 @@ class Ties:
     def expected(self, albedo: Tensor) -> tuple[Tensor, Tensor]:
         """(N, 3) albedo that guessed surfels should have if others have `albedo` (N, 3), and (N, 1) its variance.
 
-        Where nothing is expected the variance is infinite.
+        The variance is that by which a Gaussian pulls as Student's t does at the albedo that they have; where nothing
+        is expected it is infinite.
         """
         found, doubt = self._surfaces.expected(albedo)
         grey = found.mean(dim=1, keepdim=True)
