@@ -113,46 +113,53 @@ class GuessedSurfaces:
 
     def expected(self, albedo: Tensor) -> tuple[Tensor, Tensor]:
         """(N, 3) albedo that guessed surfels should have if others have `albedo` (N, 3), the median of their kin, and
-        (N, 1) how much its logarithm is in doubt: as much as these differ, and on another side of a thing what seen
-        sides do as well. NaN where there are none, and where seen.
+        (N, 1) how much its logarithm is in doubt, as much as these differ. NaN where there are none, and where seen.
 
-        Where a bend goes out of sight few may be seen of it: its variance is a draw of what all bends have in common,
-        of FREEDOM degrees of freedom."""
+        Of a bend or of sides few may be seen: their variance is a draw of what seen ones have in common, of FREEDOM
+        degrees of freedom. It is one of albedo, as what is black is known to no small part of itself."""
         found = torch.full_like(albedo, torch.nan)
         doubt = torch.full_like(albedo[:, :1], torch.nan)
-        grey = albedo.mean(dim=1).clamp(min=1e-3).log()
+        grey, common = albedo.mean(dim=1).double(), {BENT: self._along_bends(albedo), SIDES: self._across_edges(albedo)}
         for label, (kin, kinship) in enumerate(zip(self.kin, self.kinship, strict=True)):
-            if len(kin) and (kinship != SIDES or len(self.edges)):
-                own = self.labels == label
-                found[own] = albedo[kin].median(dim=0).values
-                variance = grey[kin].var(correction=0)
-                if kinship == SIDES:
-                    variance = variance + self._across_edges(grey)
-                if kinship == BENT:
-                    variance = (FREEDOM * self._along_bends(grey) + len(kin) * variance) / (FREEDOM + len(kin))
-                doubt[own] = variance.sqrt().clamp(min=LEAST_DOUBT)
+            if not len(kin):
+                continue
+            own = self.labels == label
+            found[own] = albedo[kin].median(dim=0).values
+            if kinship == PLANE:
+                doubt[own] = _spread(albedo[kin])
+            else:
+                variance = likely_variance(grey[kin] - grey[kin].median(), common[kinship])
+                known = grey[kin].median().clamp(min=1e-3)
+                doubt[own] = (variance.sqrt() / known).clamp(min=LEAST_DOUBT).to(doubt)
         return found, doubt
 
-    def _along_bends(self, grey: Tensor) -> Tensor:
-        """() variance of logarithms of albedo (N,) along bent surfaces that go out of sight."""
-        bends = [grey[kin] for kin, kinship in zip(self.kin, self.kinship, strict=True) if kinship == BENT]
-        return torch.cat([logs - logs.mean() for logs in bends if len(logs)]).square().mean()
+    def _along_bends(self, albedo: Tensor) -> Tensor:
+        """() likely variance of albedo (N, 3) along bent surfaces that go out of sight."""
+        grey = albedo.mean(dim=1).double()
+        bends = [grey[kin] for kin, how in zip(self.kin, self.kinship, strict=True) if how == BENT and len(kin)]
+        return likely_variance(torch.cat([grey[:0], *(values - values.median() for values in bends)]))
 
-    def _across_edges(self, grey: Tensor) -> Tensor:
-        """() square of the scale of Student's t of what logarithms of albedo (N,) differ by from side to side.
-
-        Most things are of one paint, and a few black beside white: these alone would make a root mean square.
-        """
-        return likely_scale(grey[self.edges[:, 0]] - grey[self.edges[:, 1]]).square()
+    def _across_edges(self, albedo: Tensor) -> Tensor:
+        """() likely variance of what albedo (N, 3) differs by from side to side of seen things."""
+        grey = albedo.mean(dim=1).double()
+        return likely_variance(grey[self.edges[:, 0]] - grey[self.edges[:, 1]])
 
 
-def likely_scale(differences: Tensor) -> Tensor:
-    """() that of Student's t around 0 with FREEDOM degrees by which differences (D,) are likeliest (EM)."""
-    squares = differences.double().square()
-    scale = squares.mean()
+def likely_variance(differences: Tensor, common: Tensor | None = None) -> Tensor:
+    """() square of the scale of Student's t with FREEDOM degrees by which differences (D,) from 0 are likeliest (EM).
+
+    Most things are of one paint, and a few are black beside white: these alone would make a root mean square.
+
+    Args:
+        common: what it is itself a draw of, of FREEDOM degrees of freedom.
+    """
+    squares = differences.square()
+    prior, known = (0.0, 0.0) if common is None else (FREEDOM * common, FREEDOM)
+    variance = (prior + squares.sum()) / max(known + len(squares), 1.0)
     for _ in range(ROUNDS):
-        scale = ((FREEDOM + 1.0) * squares / (FREEDOM + squares / scale.clamp(min=1e-12))).mean()
-    return scale.sqrt().to(differences)
+        weighed = (FREEDOM + 1.0) * squares / (FREEDOM + squares / variance.clamp(min=1e-12))
+        variance = (prior + weighed.sum()) / max(known + len(squares), 1.0)
+    return variance
 
 
 def _groups(surfaces: np.ndarray, chosen: Tensor) -> list[Tensor]:

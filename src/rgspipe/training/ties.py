@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.renderer.sparse import SparseOperator
-from rgspipe.scene.guesses import FREEDOM, GuessedSurfaces
+from rgspipe.scene.guesses import GuessedSurfaces
 from rgspipe.scene.surfels import Surfels
 
 
@@ -17,8 +17,7 @@ class Ties:
 
     What a guessed surface does to images it does by the light that it sends back, which hardly tells its parts apart;
     each on its own they would end as black and white patches. What it goes on from, in its plane, around a bend or
-    across an edge, is what it is expected to be like, within what these differ by. Most things are of one paint, and
-    what is expected of the others is far off: it is a draw of Student's t, and pulls less at what is far from it.
+    across an edge, is what it is expected to be like, within what these differ by.
     """
 
     def __init__(self, surfels: Surfels) -> None:
@@ -54,12 +53,9 @@ class Ties:
     def expected(self, albedo: Tensor) -> tuple[Tensor, Tensor]:
         """(N, 3) albedo that guessed surfels should have if others have `albedo` (N, 3), and (N, 1) its variance.
 
-        The variance is that by which a Gaussian pulls as Student's t does at the albedo that they have; where nothing
-        is expected it is infinite.
+        Where nothing is expected the variance is infinite.
         """
         found, doubt = self._surfaces.expected(albedo)
-        grey = found.mean(dim=1, keepdim=True)
-        away = (albedo.mean(dim=1, keepdim=True).clamp(min=1e-3) / grey.clamp(min=1e-3)).log()
-        variance = (FREEDOM * doubt.square() + away.square()) / (FREEDOM + 1.0) * grey.square()
+        variance = (doubt * found.mean(dim=1, keepdim=True)).square()
         known = found.isfinite().all(dim=1, keepdim=True)
         return torch.where(known, found, 0.0), torch.where(known, variance, torch.inf)
