@@ -15,7 +15,7 @@ from rgspipe.scene.guesses import (
     GuessedSurfaces,
     doubts_of_guesses,
     guessed_surfaces,
-    likely_scale,
+    likely_variance,
     spread_of_albedo,
 )
 from rgspipe.scene.rectangles import solid_box, surfels_on
@@ -112,27 +112,37 @@ def test_another_side_of_a_thing_is_expected_to_be_like_those_that_were_seen() -
     assert bool(found[~back].isnan().all())
 
 
-def test_it_is_doubted_as_much_as_sides_differ_that_were_seen() -> None:
-    """Sides x = 0 and x = 1 are half as bright as the others."""
+def test_it_is_doubted_as_much_as_the_sides_differ_that_it_touches() -> None:
+    """Sides x = 0 and x = 1 are half as bright as the others: 40 of the 80 surfels around it are 0.3 off the rest."""
     things = solid([[0.3] * 3] * 2 + [[0.6] * 3] * 4)
-    back = things.guessed > 0.0
+    back, step = things.guessed > 0.0, 0.3**2
     doubt = GuessedSurfaces.of(things).expected(things.albedo)[1][back]
-    # Of eight edges between sides that were seen six have one of these on one side: 4 s² + d² = ¾ · 5 d² for Student's
-    # t; and two of the four sides that it touches are such.
-    known = math.log(2.0) * math.sqrt(0.6875 + 0.25)
-    assert float(doubt.max()) == float(doubt.min()) == pytest.approx(known, rel=0.02)  # measured 1e-15
+    # Of eight edges between sides that were seen six have one of these on one side. For Student's t of four degrees
+    # 4 s² + d² = ¾ · 5 d² of these, and (80 + 4) s² = 4 common + 40 · 5 d² / (4 + d²/s²) of what it touches.
+    common, variance = 0.6875 * step, (0.3 * float(doubt.max())) ** 2
+    known = 4.0 * common + 40.0 * 5.0 * step / (4.0 + step / variance)
+    assert float(doubt.min()) == float(doubt.max())
+    assert 84.0 * variance == pytest.approx(known, rel=1e-5)  # measured 4e-15
     # A fit doubts it as much as anything that was not seen.
     doubts = doubts_of_guesses(things)
     assert torch.equal(doubts[back], spread_of_albedo(things).expand(int(back.sum())).to(doubts))
 
 
 def test_a_few_things_that_are_black_beside_white_do_not_open_what_all_others_are_like() -> None:
-    """Nine in ten differ by what draws of a deviation of 0.1 do, the others by a factor of ten."""
-    draws = 0.1 * torch.randn(900, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
-    mixed = torch.cat([draws, torch.full((100,), math.log(10.0)).double()])
-    # Measured 0.083 of these draws alone, 0.127 of all; a root mean square is 0.73.
-    assert float(likely_scale(draws)) == pytest.approx(0.1, rel=0.25)
-    assert float(likely_scale(mixed)) < 0.15 < 0.7 < float(mixed.square().mean().sqrt())
+    """Nine in ten differ by what draws of a deviation of 0.03 do, the others by 0.7."""
+    draws = 0.03 * torch.randn(900, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    mixed = torch.cat([draws, torch.full((100,), 0.7).double()])
+    # Student's t has draws of a Gaussian narrower than their deviation. Measured 0.0249 of these alone, 0.0381 of all.
+    assert float(likely_variance(draws).sqrt()) == pytest.approx(0.025, rel=0.02)
+    assert float(likely_variance(mixed).sqrt()) < 0.045 < 0.2 < float(mixed.square().mean().sqrt())
+
+
+def test_what_is_seen_little_of_is_as_what_all_have_in_common() -> None:
+    common = torch.tensor(0.01, dtype=torch.float64)
+    assert float(likely_variance(common.new_zeros(0), common)) == pytest.approx(0.01)
+    assert float(likely_variance(common.new_zeros(1), common)) == pytest.approx(0.008)  # four fifths of it
+    assert float(likely_variance(common.new_zeros(996), common)) == pytest.approx(4e-5)
+    assert float(likely_variance(common.new_zeros(0))) == 0.0
 
 
 def balls(apart: float, colours: tuple[float, float]) -> Surfels:
@@ -165,21 +175,24 @@ def test_what_of_a_bent_surface_is_out_of_sight_is_expected_to_be_like_the_rest(
 def test_two_things_that_nothing_parts_are_in_doubt_by_both_their_colours() -> None:
     """Balls that are turned by 29° where they meet are one surface: it is of two greys, as many surfels of either."""
     things = balls(0.5, (0.3, 0.6))
-    doubt = GuessedSurfaces.of(things).expected(things.albedo)[1][things.guessed > 0.0]
-    assert float(doubt.min()) == pytest.approx(0.5 * math.log(2.0), rel=0.01)  # measured 1e-5
+    found, doubt = (part[things.guessed > 0.0] for part in GuessedSurfaces.of(things).expected(things.albedo))
+    # A half is 0.3 off the other: 4 s² + d² = ½ · 5 d² for Student's t of four degrees.
+    known = 0.3 * math.sqrt(0.375) / float(found[0, 0])
+    assert float(doubt.min()) == float(doubt.max()) == pytest.approx(known, rel=0.01)  # measured 0.0011
 
 
-def test_bent_surfaces_are_doubted_as_much_as_they_are_uneven() -> None:
-    """Of a ball the seen half is of two greys, as many surfels of either; and few surfels share the doubt of all."""
+def test_bent_surfaces_are_doubted_by_how_uneven_they_are_themselves() -> None:
+    """Of two balls a quarter of one is of another grey: its far side is in doubt, that of the other is not."""
     things = balls(4.0, (0.3, 0.3))
     x = things.centers[:, 0]
     patched = (x > 0.0) & (things.centers[:, 2] > 0.0) & (things.guessed == 0.0)
     things = replace(things, albedo=torch.where(patched[:, None], 0.6, things.albedo))
     doubt = GuessedSurfaces.of(things).expected(things.albedo)[1][:, 0]
-    back, half = things.guessed > 0.0, 0.5 * math.log(2.0)
+    back = things.guessed > 0.0
     even, uneven = float(doubt[back & (x < 0.0)].max()), float(doubt[back & (x > 0.0)].max())
-    # Of 600 seen surfels each: FREEDOM of what both are together, which is half, is all that they share.
-    assert uneven == pytest.approx(half, rel=0.02) and even == pytest.approx(LEAST_DOUBT, rel=1e-6)  # measured MEAS
+    # As of one surface above, whose other half is common to both balls and counts for FREEDOM of 605 surfels.
+    assert uneven == pytest.approx(math.sqrt(0.375), rel=0.02)  # measured 0.006
+    assert even == pytest.approx(LEAST_DOUBT, rel=1e-6)
 
 
 def test_walls_that_meet_in_a_corner_tell_nothing_of_each_other(box) -> None:
