@@ -73,9 +73,9 @@ class GuessedSurfaces:
     Attributes:
         labels: (N,) int64, as of `labels_of_guesses`.
         kin: for each of the surfaces the surfels (K,) int64 that cameras saw of what it goes on from.
-        kinship: for each of them what these are. PLANE: seen in its plane, at least KIN of what is guessed. SIDES: of
-            the thing's other sides, which a flat one touches. BENT: of what goes out of sight in a bent one, as far
-            back as it goes on; guesses on two things that are sunk into each other are parted by what is nearer.
+        kinship: for each of them what these are. PLANE: seen in its plane, at least KIN of what is guessed. BENT: of
+            what goes out of sight in a bent one, as far back as it goes on; guesses on two things that are sunk into
+            each other are parted by what is nearer. SIDES: else, of the thing's other sides, which it touches.
         edges: (E, 2) int64 surfels that cameras saw on both sides of edges of things.
     """
 
@@ -101,7 +101,7 @@ class GuessedSurfaces:
             alike = seen & _in_plane_of(own, centers, normals, spacing)
             if int(alike.sum()) >= KIN * int(own.sum()):
                 parts = [(own, alike.nonzero()[:, 0], PLANE)]
-            elif float(normals[own].mean(dim=0).norm()) > FLAT:
+            elif float(normals[own].mean(dim=0).norm()) > FLAT or not beyond.reaches(own):
                 parts = [(own, near[own[near[:, 0]] & seen[near[:, 1]], 1].unique(), SIDES)]
             else:
                 parts = [(part, of_part, BENT) for part, of_part in beyond.parts(own)]
@@ -200,6 +200,10 @@ class _OutOfSight:
     def of(cls, ways: SmoothWays, seen: np.ndarray) -> _OutOfSight:
         source, length = ways.sources(seen & ways.lead_to(seen))
         return cls(ways, seen, source, length, np.where(source < 0, -1, ways.surfaces(seen)[source]))
+
+    def reaches(self, own: Tensor) -> bool:
+        """Whether a guessed surface `own` (N,) goes on from one that was seen."""
+        return bool((self.source[own.cpu().numpy()] >= 0).any())
 
     def parts(self, own: Tensor) -> list[tuple[Tensor, Tensor]]:
         """What of a guessed surface `own` (N,) goes on from each of those that were seen, and (K,) surfels of these.
