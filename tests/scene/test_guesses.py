@@ -10,8 +10,10 @@ import torch
 
 from rgspipe.scene import Surfels
 from rgspipe.scene.guesses import (
+    FLAT,
     LEAST_DOUBT,
     MOST,
+    SIDES,
     GuessedSurfaces,
     doubts_of_guesses,
     guessed_surfaces,
@@ -19,6 +21,7 @@ from rgspipe.scene.guesses import (
     spread_of_albedo,
 )
 from rgspipe.scene.rectangles import solid_box, surfels_on
+from rgspipe.scene.surfels import quaternion_from_normal
 from rooms import closed_box, sphere
 from rooms import surfels_on as surfels_on_points
 
@@ -179,6 +182,23 @@ def test_two_things_that_nothing_parts_are_in_doubt_by_both_their_colours() -> N
     # A half is 0.3 off the other: 4 s² + d² = ½ · 5 d² for Student's t of four degrees.
     known = 0.3 * math.sqrt(0.375) / float(found[0, 0])
     assert float(doubt.min()) == float(doubt.max()) == pytest.approx(known, rel=0.01)  # measured 0.0011
+
+
+def test_a_bent_surface_that_goes_on_from_nothing_is_like_the_sides_that_it_touches() -> None:
+    """A face that is an arc of 100° into the box: no seen side goes on in it smoothly."""
+    things = solid([[0.6, 0.4, 0.3]] * 6)
+    back, radius = things.guessed > 0.0, 0.5 / math.sin(math.radians(50.0))
+    across = (0.5 - things.centers[:, 0]) / radius
+    arc = torch.stack([across, (1.0 - across.square()).clamp(min=0.0).sqrt(), torch.zeros_like(across)], dim=1)
+    dent = radius * (arc[:, 1] - math.cos(math.radians(50.0)))
+    moved = things.centers - torch.where(back, dent, 0.0)[:, None] * torch.tensor([0.0, 1.0, 0.0]).to(dent)
+    turned = quaternion_from_normal(torch.where(back[:, None], arc, things.normals))
+    things = replace(things, centers=moved, rotations=turned)
+    assert float(things.normals[back].mean(dim=0).norm()) < FLAT
+    surfaces = GuessedSurfaces.of(things)
+    found, _ = surfaces.expected(things.albedo)
+    assert surfaces.kinship == (SIDES,) and bool((surfaces.labels[back] == 0).all())
+    torch.testing.assert_close(found[back], torch.tensor([0.6, 0.4, 0.3]).to(found).expand(int(back.sum()), 3))
 
 
 def test_bent_surfaces_are_doubted_by_how_uneven_they_are_themselves() -> None:
