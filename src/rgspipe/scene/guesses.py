@@ -121,7 +121,7 @@ class GuessedSurfaces:
         doubt = torch.full_like(albedo[:, :1], torch.nan)
         grey, common = albedo.mean(dim=1).double(), {BENT: self._along_bends(albedo), SIDES: self._across_edges(albedo)}
         for label, (kin, kinship) in enumerate(zip(self.kin, self.kinship, strict=True)):
-            if not len(kin):
+            if not len(kin) or (kinship == SIDES and not len(self.edges)):
                 continue
             own = self.labels == label
             found[own] = albedo[kin].median(dim=0).values
