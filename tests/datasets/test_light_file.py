@@ -95,6 +95,8 @@ def test_what_is_wrong_with_a_light_is_named(tmp_path: Path, changes: dict, mess
         ("{", "invalid JSON"),
         ("[]", "JSON object, found list"),
         ('{"lights": []}', '"version"'),
+        ('{"frames": [], "w": 3}', "a light file, with .*found frames, w. Name a light file"),
+        ("{}", "found nothing"),
         ('{"version": 9, "lights": []}', '"version": 1, found 9'),
         ('{"version": 1, "lights": 3}', "list of objects"),
     ],

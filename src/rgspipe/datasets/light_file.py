@@ -39,6 +39,9 @@ def read_lights(path: str | Path, *, any_world: bool = False) -> LightRig:
             that were exported for other programs.
     """
     content = read_json(path, "a light file")
+    if not content.keys() & {"version", "lights"}:
+        found, remedy = ", ".join(sorted(content)) or "nothing", "Name a light file, such as a fit's lights.json."
+        raise InputError(path, expected='a light file, with "version" and "lights"', found=found, remedy=remedy)
     version = required(content, "version", path)
     if version != VERSION:
         raise InputError(
