@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,9 +12,14 @@ from rgspipe.scene.surfels import NO_CLIP
 from rgspipe.training.initialise.cloud import Cloud
 from rgspipe.training.initialise.resample import thin
 
+#: Tells of places (M, 3) in planes of normals (M, 3) whether rays that went past them end so far behind the plane.
+Through = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
+
 DIRECTIONS = 72
 #: Between two of them edges are looked for in so many steps to either side.
 FINER = 8
+#: Strips are followed in one of so many of them: at the end of a surfel they are as wide as that.
+COARSER = 3
 #: Surfels whose edges are looked for at once; bounds the memory.
 CHUNK = 256
 
@@ -29,6 +35,9 @@ class EdgeOptions:
         trim: outermost points that are left out in each direction, against strays.
         least_angle: between a surfel's two edges [rad]; nearer ones are the same edge.
         least_points: with fewer coplanar points around it a surfel stays whole.
+        strip: half-width of the strips along which the surface is followed from a surfel's centre.
+        expected: a strip is empty where so many points would be if the surface went on; as `trim` of them may be
+            strays, that is chance once in 10⁵ strips.
     """
 
     reach: float = 1.5
@@ -37,6 +46,8 @@ class EdgeOptions:
     trim: int = 2
     least_angle: float = 0.9
     least_points: int = 24
+    strip: float = 0.25
+    expected: float = 16.0
 
 
 def find_edges(
@@ -46,12 +57,17 @@ def find_edges(
     thinned: Cloud,
     spacing: np.ndarray,
     seen: tuple[float, float],
+    through: Through | None = None,
     options: EdgeOptions | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Up to two half-plane clips a surfel, from the support function of the coplanar points around it.
 
     In the plane of a surfel, the support s(φ) = max x·(cos φ, sin φ) of the points around it is about the reach
     inside a surface, and the distance of the edge in the direction of an edge. The clip stands at the smallest s.
+
+    Beside a notch, such as the corner of an opening in a wall, the surface goes on past both edges, and s tells
+    nothing. There strips are followed from the centre, and the clip stands before the nearest place that one finds
+    empty. What it takes away of the surface is covered by neighbours that look along one of the edges.
 
     Args:
         centers: N surfels.
@@ -61,6 +77,7 @@ def find_edges(
         spacing: (N,) of each surfel to its neighbours, scene units.
         seen: how far a surfel is seen that is whole, and one that is clipped, in spacings: an edge that is nearer
             clips it.
+        through: tells empty places; without it surfels at notches hang over.
 
     Returns:
         offsets (N, 2), scene units, NO_CLIP where there is no edge, and angles (N, 2) [rad].
@@ -70,13 +87,18 @@ def find_edges(
     radius = options.reach * seen[1] * spacing
     coarse = _Around(centers, axes, thin(thinned, median / 4.0), radius, replace(options, least_points=0), median)
     # Coarse points stand inside of the true edge, so that the test by these is the wider one.
-    near = np.flatnonzero(coarse.support(_compass(len(centers))).min(axis=1) < seen[0] * spacing)
+    compass = _compass(len(centers))
+    nearest = coarse.support(compass).min(axis=1)
+    if through is not None:
+        nearest = np.minimum(nearest, coarse.along_strips(compass[:, ::COARSER])[0].min(axis=1))
+    near = np.flatnonzero(nearest < seen[0] * spacing)
     if not len(near):
         return offsets, angles
     fine = thin(cloud, 0.08 * median, average=False)
     fine = fine[_within(fine.points, centers.points[near], float(radius.max()))]
     around = _Around(centers[near], axes[near], fine, radius[near], options, median)
-    offsets[near], angles[near] = _clips(around, spacing[near], seen, options)
+    empty = np.full((len(near), DIRECTIONS), np.inf) if through is None else around.empty(through)
+    offsets[near], angles[near] = _clips(around, spacing[near], seen, empty)
     return offsets, angles
 
 
@@ -100,48 +122,110 @@ class _Around:
 
     def support(self, angles: np.ndarray) -> np.ndarray:
         """(N, D) support of the coplanar points in the directions `angles` (N, D), +inf where there are too few."""
-        tree, support = cKDTree(self.cloud.points), np.full(angles.shape, np.inf)
+        support = np.full(angles.shape, np.inf)
+        for surfel, flat in self._coplanar():
+            support[surfel] = _outermost(flat @ _directions(angles[surfel]), self.options.trim)
+        return support
+
+    def along_strips(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(N, D) support of those in a strip in each direction, and how many more it would hold if the surface went on
+        to the support of all."""
+        supports, missed, width = (
+            np.full(angles.shape, np.inf),
+            np.zeros(angles.shape),
+            self.options.strip * self.spacing,
+        )
+        for surfel, flat in self._coplanar():
+            directions = _directions(angles[surfel])
+            reach, off = flat @ directions, np.abs(flat @ _directions(angles[surfel] + 0.5 * np.pi))
+            supports[surfel] = own = _outermost(np.where(off < width, reach, 0.0), self.options.trim)
+            # Of the fullest quarter, as the others may end nearby.
+            quarter = 2 * (flat[:, 0] > 0.0) + (flat[:, 1] > 0.0)
+            density = 4.0 * np.bincount(quarter).max() / (np.pi * self.radius[surfel] ** 2)
+            missed[surfel] = 2.0 * width * density * (_outermost(reach, self.options.trim) - own)
+        return supports, missed
+
+    def empty(self, through: Through) -> np.ndarray:
+        """(N, DIRECTIONS) how far off strips end though the surface goes on beside them, and rays went through what is
+        there; inf where none does."""
+        compass, empty = _compass(len(self.centers))[:, ::COARSER], np.full((len(self.centers), DIRECTIONS), np.inf)
+        stand, missed = self.along_strips(compass)
+        surfel, number = np.nonzero(missed >= self.options.expected)
+        stand = stand[surfel, number]
+        first, second, normal = self.axes[surfel].transpose(1, 0, 2)
+        across, up = (stand + self.options.strip * self.spacing) * _directions(compass[surfel, number])
+        places = self.centers.points[surfel] + across[:, None] * first + up[:, None] * second
+        seen = through(places, normal, self.options.plane_tolerance * self.spacing)
+        empty[surfel[seen], number[seen] * COARSER] = stand[seen]
+        return empty
+
+    def _coplanar(self) -> Iterator[tuple[int, np.ndarray]]:
+        """Each of the surfels that has enough of them around it, and the points (P, 2) in its plane."""
+        tree, least = cKDTree(self.cloud.points), max(self.options.least_points, self.options.trim + 1)
         for start in range(0, len(self.centers), CHUNK):
             block = slice(start, start + CHUNK)
             lists = tree.query_ball_point(
                 self.centers.points[block], self.radius[block], workers=-1, return_sorted=True
             )
             for surfel, found in enumerate(lists, start):
-                support[surfel] = self._support_of(surfel, np.asarray(found, dtype=np.int64), angles[surfel])
-        return support
+                near = np.asarray(found, dtype=np.int64)
+                inside = self.cloud.points[near] - self.centers.points[surfel]
+                first, second, normal = self.axes[surfel]
+                keep = np.abs(inside @ normal) < self.options.plane_tolerance * self.spacing
+                keep &= self.cloud.normals[near] @ normal > 0.7
+                if keep.sum() >= least:
+                    yield surfel, inside[keep] @ np.stack([first, second], axis=1)
 
-    def _support_of(self, surfel: int, near: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        """(D,) of one of them, by the points `near`."""
-        inside = self.cloud.points[near] - self.centers.points[surfel]
-        first, second, normal = self.axes[surfel]
-        keep = np.abs(inside @ normal) < self.options.plane_tolerance * self.spacing
-        keep &= self.cloud.normals[near] @ normal > 0.7
-        if keep.sum() <= max(self.options.least_points - 1, self.options.trim):
-            return np.full(len(angles), np.inf)
-        flat = inside[keep] @ np.stack([first, second], axis=1)
-        reach = flat @ np.stack([np.cos(angles), np.sin(angles)])
-        last = len(reach) - 1 - self.options.trim
-        return np.partition(reach, last, axis=0)[last]
+
+def _directions(angles: np.ndarray) -> np.ndarray:
+    """(2, D) unit vectors."""
+    return np.stack([np.cos(angles), np.sin(angles)])
+
+
+def _outermost(reach: np.ndarray, trim: int) -> np.ndarray:
+    """(D,) largest of (P, D) but for the `trim` largest."""
+    last = len(reach) - 1 - trim
+    return np.partition(reach, last, axis=0)[last]
 
 
 def _clips(
-    around: _Around, spacing: np.ndarray, seen: tuple[float, float], options: EdgeOptions
+    around: _Around, spacing: np.ndarray, seen: tuple[float, float], empty: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Offsets (N, 2) and angles (N, 2) of the two nearest edges, the second well apart from the first."""
-    compass = _compass(len(spacing))
-    support, rows = around.support(compass), np.arange(len(spacing))
+    """Offsets (N, 2) and angles (N, 2) of the two nearest edges, the second well apart from the first.
+
+    Args:
+        empty: (N, DIRECTIONS) as of `_Around.empty`; an edge is one of these places if no other edge takes it away.
+    """
+    options, compass, rows = around.options, _compass(len(spacing)), np.arange(len(spacing))
+    support = around.support(compass)
     # The support of a polygon has its local minima at the edges; at a corner the lowest values stand side by side.
     dip = (support <= np.roll(support, 1, axis=1)) & (support <= np.roll(support, -1, axis=1))
     edges = np.where(dip, support, np.inf)
-    first = edges.argmin(axis=1)
-    turn = np.abs((compass - compass[rows, first][:, None] + np.pi) % (2.0 * np.pi) - np.pi)
-    others = np.where(turn > options.least_angle, edges, np.inf)
-    nearest = np.stack([first, others.argmin(axis=1)], axis=1)
-    distance = np.stack([edges[rows, first], others[rows, nearest[:, 1]]], axis=1)
+    slack = options.strip * around.spacing
+    for number in _two_nearest(edges, compass, options).T:
+        empty = _left_by(edges[rows, number], compass[rows, number], empty, compass, slack)
+    either = np.minimum(edges, empty)
+    nearest = _two_nearest(either, compass, options)
+    at = (rows[:, None], nearest)
+    distance, notch = either[at], empty[at] < edges[at]
     clipped = (distance[:, :1] < seen[0] * spacing[:, None]) & (distance < seen[1] * spacing[:, None])
-    distance, angles = _between(around, compass[rows[:, None], nearest])
+    refined, angles = _between(around, compass[at])
+    distance, angles = np.where(notch, distance, refined), np.where(notch, compass[at], angles)
     placed = np.maximum(distance, options.least_offset * spacing[:, None])
     return np.where(clipped, placed, NO_CLIP), np.where(clipped, angles, 0.0)
+
+
+def _two_nearest(distance: np.ndarray, compass: np.ndarray, options: EdgeOptions) -> np.ndarray:
+    """(N, 2) int directions of the least distance (N, D), and of the least one well apart from it."""
+    rows, first = np.arange(len(distance)), distance.argmin(axis=1)
+    turn = np.abs((compass - compass[rows, first][:, None] + np.pi) % (2.0 * np.pi) - np.pi)
+    second = np.where(turn > options.least_angle, distance, np.inf).argmin(axis=1)
+    return np.stack([first, second], axis=1)
+
+
+def _left_by(offset: np.ndarray, angle: np.ndarray, empty: np.ndarray, compass: np.ndarray, slack: float) -> np.ndarray:
+    """(N, D) of the `empty` places those that a clip (N,) does not take away, by more than `slack`; else inf."""
+    return np.where(empty * np.cos(compass - angle[:, None]) > offset[:, None] - slack, np.inf, empty)
 
 
 def _between(around: _Around, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -20,6 +20,7 @@ from rgspipe.training.initialise.edges import find_edges
 from rgspipe.training.initialise.fusion import fuse
 from rgspipe.training.initialise.planes import refit_planes
 from rgspipe.training.initialise.resample import estimate_spacing, even_out, neighbour_spacing, thin_for
+from rgspipe.training.initialise.through import LookedThrough
 
 #: Pixels of depth that are used for each surfel that is wanted, about: memory goes with them. Of 800 in a room whose
 #: depth has 1 % of noise, all leave normals 0.02° off, 400 0.03°, 200 0.05° and 100 0.07°; places are as good with 100.
@@ -104,22 +105,30 @@ def initialise_surfels(
             remedy=f"Ask for at most {max(len(cloud) // 4, 1)} surfels (surfels=…), or give more views or a higher "
             "resolution.",
         )
-    return surfels_on(cloud, count, seed=seed, clips=clips, footprint=footprint)
+    return surfels_on(cloud, count, seed=seed, clips=clips, footprint=footprint, views=views)
 
 
 def surfels_on(
-    cloud: Cloud, count: int, *, seed: int, clips: bool = True, footprint: Footprint | None = None
+    cloud: Cloud,
+    count: int,
+    *,
+    seed: int,
+    clips: bool = True,
+    footprint: Footprint | None = None,
+    views: Sequence[View] = (),
 ) -> Surfels:
     """`count` surfels spread evenly over the surfaces of a cloud that has at least as many points.
 
     Args:
         cloud: dense points with normals towards the side that light falls on.
         seed, clips, footprint: as of `initialise_surfels`.
+        views: photographs, those with depth of which tell where openings are.
     """
     footprint, spacing = footprint or Footprint(), estimate_spacing(cloud, count)
     thinned = thin_for(cloud, count, spacing)
     centers = refit_planes(even_out(thinned, count, spacing, np.random.default_rng(seed)), thinned, spacing)
-    return _dress(centers, neighbour_spacing(centers, spacing), cloud if clips else None, thinned, footprint)
+    spacings, through = neighbour_spacing(centers, spacing), LookedThrough(views) if views else None
+    return _dress(centers, spacings, cloud if clips else None, thinned, footprint, through)
 
 
 def cloud_from_views(
@@ -144,14 +153,21 @@ def cloud_from_views(
     return fuse(seen, [view for view in views if view.depth is not None], estimate_spacing(cloud, count))
 
 
-def _dress(centers: Cloud, spacing: np.ndarray, cloud: Cloud | None, thinned: Cloud, footprint: Footprint) -> Surfels:
+def _dress(
+    centers: Cloud,
+    spacing: np.ndarray,
+    cloud: Cloud | None,
+    thinned: Cloud,
+    footprint: Footprint,
+    through: LookedThrough | None,
+) -> Surfels:
     """Surfels at `centers` with scales from their spacing (N,), and with edges if the whole cloud is given."""
     count, median = len(centers), float(np.median(spacing))
     rotations = quaternion_from_normal(torch.from_numpy(centers.normals))
     offsets, angles = np.full((count, 2), NO_CLIP), np.zeros((count, 2))
     if cloud is not None:
         axes = quaternion_to_axes(rotations).numpy()
-        offsets, angles = find_edges(centers, axes, cloud, thinned, spacing, footprint.seen)
+        offsets, angles = find_edges(centers, axes, cloud, thinned, spacing, footprint.seen, through)
     growth = np.where(offsets[:, 0] < NO_CLIP, footprint.clipped_growth, 1.0)
     scale = torch.from_numpy(footprint.scale * growth * spacing).float()
     coverage = Coverage(
