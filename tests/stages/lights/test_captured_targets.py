@@ -81,8 +81,10 @@ def test_jpeg_targets_are_fitted_as_clipped_images_that_were_blurred(
     assert _error(light) < 1e-2 and _error(naive) > 5.0 * _error(light)
 
 
-def test_alpha_masks_what_is_not_the_scene(freeze: Artifact, images: list[torch.Tensor], tmp_path: Path) -> None:
-    """A third of each image is someone else's, and its alpha 0."""
+def test_alpha_masks_what_is_not_the_scene(
+    freeze: Artifact, images: list[torch.Tensor], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A third of each image is someone else's, and its alpha 0; masks that are the wrong way round are told."""
     spoilt, alphas = [image.clone() for image in images], [torch.ones(RESOLUTION, RESOLUTION) for _ in images]
     for image, alpha in zip(spoilt, alphas, strict=True):
         image[:, : RESOLUTION // 3] = torch.rand(3)
@@ -90,6 +92,10 @@ def test_alpha_masks_what_is_not_the_scene(freeze: Artifact, images: list[torch.
     write_display_target(tmp_path / "masked", spoilt, alphas)
     light, _ = _fitted(freeze, tmp_path / "out", tmp_path / "masked")
     assert _error(light) < 3e-3
+    assert "masks" not in capsys.readouterr().out
+    write_display_target(tmp_path / "inverted", images, [1.0 - alpha for alpha in alphas])
+    _fitted(freeze, tmp_path / "again", tmp_path / "inverted")
+    assert "target inverted: masks or alpha leave out 69 %" in capsys.readouterr().out  # 22 of 32 columns
 
 
 def test_views_of_unknown_exposure(freeze: Artifact, images: list[torch.Tensor], tmp_path: Path) -> None:

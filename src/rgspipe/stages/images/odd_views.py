@@ -9,9 +9,7 @@ import torch
 from rgspipe.capture.refusals import OFF
 from rgspipe.datasets.views import View
 from rgspipe.evidence.conventions import AstrayView, alone, astray
-
-#: Masks that leave out more than this part of the surfaces may be the wrong way round.
-MOSTLY = 0.5
+from rgspipe.evidence.masks import masked_out
 
 #: A photograph is black whose mean is below this part of the brightest one's of the same lighting.
 BLACK = 1e-3
@@ -74,17 +72,7 @@ def _black(views: Sequence[View], names: Sequence[str]) -> str:
 
 
 def _masked_out(views: Sequence[View]) -> str:
-    """A line about masks that leave out most surfaces; where depth says that there are none, nothing is left out."""
-    left_out = there = 0
-    for view in views:
-        if view.depth is not None:
-            surface = ~torch.isposinf(view.depth)
-            left_out += int((surface & (view.alpha < 0.5)).sum())
-            there += int(surface.sum())
-    share = left_out / max(there, 1)
-    if share <= MOSTLY:
-        return ""
-    return (
-        f"masks or alpha leave out {100 * share:.0f} % of the surfaces in the photographs: what is black in a mask "
-        "does not count. If it is meant the other way round, invert the masks"
-    )
+    """A line about masks that leave out most surfaces, as far as depth tells of them."""
+    known = [view for view in views if view.depth is not None]
+    surfaces = [~torch.isposinf(view.depth) for view in known]
+    return masked_out(surfaces, [view.alpha for view in known], "the surfaces in the photographs")
