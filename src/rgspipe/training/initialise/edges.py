@@ -36,8 +36,6 @@ class EdgeOptions:
         least_angle: between a surfel's two edges [rad]; nearer ones are the same edge.
         least_points: with fewer coplanar points around it a surfel stays whole.
         strip: half-width of the strips along which the surface is followed from a surfel's centre.
-        expected: a strip is empty where so many points would be if the surface went on; as `trim` of them may be
-            strays, that is chance once in 10⁵ strips.
     """
 
     reach: float = 1.5
@@ -47,7 +45,6 @@ class EdgeOptions:
     least_angle: float = 0.9
     least_points: int = 24
     strip: float = 0.25
-    expected: float = 16.0
 
 
 def find_edges(
@@ -90,7 +87,7 @@ def find_edges(
     compass = _compass(len(centers))
     nearest = coarse.support(compass).min(axis=1)
     if through is not None:
-        nearest = np.minimum(nearest, coarse.along_strips(compass[:, ::COARSER])[0].min(axis=1))
+        nearest = np.minimum(nearest, coarse.along_strips(compass[:, ::COARSER]).min(axis=1))
     near = np.flatnonzero(nearest < seen[0] * spacing)
     if not len(near):
         return offsets, angles
@@ -127,30 +124,20 @@ class _Around:
             support[surfel] = _outermost(flat @ _directions(angles[surfel]), self.options.trim)
         return support
 
-    def along_strips(self, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(N, D) support of those in a strip in each direction, and how many more it would hold if the surface went on
-        to the support of all."""
-        supports, missed, width = (
-            np.full(angles.shape, np.inf),
-            np.zeros(angles.shape),
-            self.options.strip * self.spacing,
-        )
+    def along_strips(self, angles: np.ndarray) -> np.ndarray:
+        """(N, D) the same of those alone that are in a strip in each direction."""
+        width, support = self.options.strip * self.spacing, np.full(angles.shape, np.inf)
         for surfel, flat in self._coplanar():
-            directions = _directions(angles[surfel])
-            reach, off = flat @ directions, np.abs(flat @ _directions(angles[surfel] + 0.5 * np.pi))
-            supports[surfel] = own = _outermost(np.where(off < width, reach, 0.0), self.options.trim)
-            # Of the fullest quarter, as the others may end nearby.
-            quarter = 2 * (flat[:, 0] > 0.0) + (flat[:, 1] > 0.0)
-            density = 4.0 * np.bincount(quarter).max() / (np.pi * self.radius[surfel] ** 2)
-            missed[surfel] = 2.0 * width * density * (_outermost(reach, self.options.trim) - own)
-        return supports, missed
+            reach = flat @ _directions(angles[surfel])
+            off = np.abs(flat @ _directions(angles[surfel] + 0.5 * np.pi))
+            support[surfel] = _outermost(np.where(off < width, reach, 0.0), self.options.trim)
+        return support
 
     def empty(self, through: Through) -> np.ndarray:
-        """(N, DIRECTIONS) how far off strips end though the surface goes on beside them, and rays went through what is
-        there; inf where none does."""
+        """(N, DIRECTIONS) how far off strips end where rays went through what follows; inf where none did."""
         compass, empty = _compass(len(self.centers))[:, ::COARSER], np.full((len(self.centers), DIRECTIONS), np.inf)
-        stand, missed = self.along_strips(compass)
-        surfel, number = np.nonzero(missed >= self.options.expected)
+        stand = self.along_strips(compass)
+        surfel, number = np.nonzero(stand < self.radius[:, None])
         stand = stand[surfel, number]
         first, second, normal = self.axes[surfel].transpose(1, 0, 2)
         across, up = (stand + self.options.strip * self.spacing) * _directions(compass[surfel, number])
