@@ -34,7 +34,7 @@ def run(context: StageContext) -> None:
         mesh = read_mesh(mesh_path(context.config), context.config.scene.mesh)
         eyes = np.stack([view.camera.origin.numpy() for view in views])
         cloud = cloud_from_mesh(mesh, eyes, count, init.seed)
-        surfels = surfels_on(cloud, count, seed=init.seed, clips=init.clips, footprint=footprint)
+        surfels = surfels_on(cloud, count, seed=init.seed, clips=init.clips, footprint=footprint, views=views)
     else:
         surfels = initialise_surfels(
             views, count, seed=init.seed, normals=init.normals, clips=init.clips, footprint=footprint, where=root

@@ -117,6 +117,9 @@ class _Around:
     options: EdgeOptions
     spacing: float
 
+    def __getitem__(self, index: np.ndarray) -> _Around:
+        return replace(self, centers=self.centers[index], axes=self.axes[index], radius=self.radius[index])
+
     def support(self, angles: np.ndarray) -> np.ndarray:
         """(N, D) support of the coplanar points in the directions `angles` (N, D), +inf where there are too few."""
         support = np.full(angles.shape, np.inf)
@@ -125,12 +128,16 @@ class _Around:
         return support
 
     def along_strips(self, angles: np.ndarray) -> np.ndarray:
-        """(N, D) the same of those alone that are in a strip in each direction."""
+        """(N, D) where the surface ends by the coplanar points that are in a strip in each direction, as `support`.
+
+        The last of n points that lie evenly as far as an edge is, on average, 1 / (n + 1) of the way before it.
+        """
         width, support = self.options.strip * self.spacing, np.full(angles.shape, np.inf)
         for surfel, flat in self._coplanar():
             reach = flat @ _directions(angles[surfel])
-            off = np.abs(flat @ _directions(angles[surfel] + 0.5 * np.pi))
-            support[surfel] = _outermost(np.where(off < width, reach, 0.0), self.options.trim)
+            inside = (reach > 0.0) & (np.abs(flat @ _directions(angles[surfel] + 0.5 * np.pi)) < width)
+            last = np.where(inside, reach, 0.0).max(axis=0)
+            support[surfel] = last * (1.0 + 1.0 / np.maximum(inside.sum(axis=0), 1))
         return support
 
     def empty(self, through: Through) -> np.ndarray:
@@ -189,24 +196,28 @@ def _clips(
     dip = (support <= np.roll(support, 1, axis=1)) & (support <= np.roll(support, -1, axis=1))
     edges = np.where(dip, support, np.inf)
     slack = options.strip * around.spacing
-    for number in _two_nearest(edges, compass, options).T:
+    for number in _two_nearest(edges, edges, compass, options).T:
         empty = _left_by(edges[rows, number], compass[rows, number], empty, compass, slack)
     either = np.minimum(edges, empty)
-    nearest = _two_nearest(either, compass, options)
-    at = (rows[:, None], nearest)
+    first = either.argmin(axis=1)
+    left = np.minimum(edges, _left_by(either[rows, first], compass[rows, first], empty, compass, slack))
+    at = (rows[:, None], _two_nearest(either, left, compass, options))
     distance, notch = either[at], empty[at] < edges[at]
     clipped = (distance[:, :1] < seen[0] * spacing[:, None]) & (distance < seen[1] * spacing[:, None])
-    refined, angles = _between(around, compass[at])
-    distance, angles = np.where(notch, distance, refined), np.where(notch, compass[at], angles)
+    found = np.stack(_between(around.support, compass[at], 1))
+    strips = np.flatnonzero((notch & clipped).any(axis=1))
+    beside = np.stack(_between(around[strips].along_strips, compass[at][strips], COARSER))
+    found[:, strips] = np.where(notch[strips], beside, found[:, strips])
+    distance, angles = found
     placed = np.maximum(distance, options.least_offset * spacing[:, None])
     return np.where(clipped, placed, NO_CLIP), np.where(clipped, angles, 0.0)
 
 
-def _two_nearest(distance: np.ndarray, compass: np.ndarray, options: EdgeOptions) -> np.ndarray:
-    """(N, 2) int directions of the least distance (N, D), and of the least one well apart from it."""
-    rows, first = np.arange(len(distance)), distance.argmin(axis=1)
+def _two_nearest(one: np.ndarray, other: np.ndarray, compass: np.ndarray, options: EdgeOptions) -> np.ndarray:
+    """(N, 2) int directions of the least distance in `one` (N, D), and of the least in `other` well apart from it."""
+    rows, first = np.arange(len(one)), one.argmin(axis=1)
     turn = np.abs((compass - compass[rows, first][:, None] + np.pi) % (2.0 * np.pi) - np.pi)
-    second = np.where(turn > options.least_angle, distance, np.inf).argmin(axis=1)
+    second = np.where(turn > options.least_angle, other, np.inf).argmin(axis=1)
     return np.stack([first, second], axis=1)
 
 
@@ -215,16 +226,18 @@ def _left_by(offset: np.ndarray, angle: np.ndarray, empty: np.ndarray, compass: 
     return np.where(empty * np.cos(compass - angle[:, None]) > offset[:, None] - slack, np.inf, empty)
 
 
-def _between(around: _Around, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Supports (N, 2) and angles (N, 2) of the edges near `angles`, which lie between two directions of the compass.
+def _between(
+    support: Callable[[np.ndarray], np.ndarray], angles: np.ndarray, step: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Supports (N, 2) and angles (N, 2) of the edges near `angles`, one of every `step` directions.
 
     Turned by δ, a line that all points of an edge of length 2l lie within stands l sin δ too far out.
     """
-    turns = np.pi / DIRECTIONS * np.linspace(-1.0, 1.0, 2 * FINER + 1)
+    turns = step * np.pi / DIRECTIONS * np.linspace(-1.0, 1.0, 2 * FINER + 1)
     tried = angles[:, :, None] + turns
-    support = around.support(tried.reshape(len(angles), -1)).reshape(tried.shape)
-    best = support.argmin(axis=2)[..., None]
-    return np.take_along_axis(support, best, axis=2)[..., 0], np.take_along_axis(tried, best, axis=2)[..., 0]
+    supports = support(tried.reshape(len(angles), angles.shape[1] * len(turns))).reshape(tried.shape)
+    best = supports.argmin(axis=2)[..., None]
+    return np.take_along_axis(supports, best, axis=2)[..., 0], np.take_along_axis(tried, best, axis=2)[..., 0]
 
 
 def _within(points: np.ndarray, centers: np.ndarray, radius: float) -> np.ndarray:
