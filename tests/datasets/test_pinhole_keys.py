@@ -68,7 +68,7 @@ def test_what_is_stated_is_the_camera(
         ({"camera_angle_x": ANGLE, "fl_y": 5, "camera_angle_y": DOWN}, "camera_angle_y: expected the same field"),
         ({"camera_angle_x": ANGLE, "w": 4, "h": 6}, r"w, h: expected the shape of the image, 6 × 4, found 4 × 6"),
         ({"cx": 3, "cy": 2}, '"fl_x" or "camera_angle_x", too, found cx, cy'),
-        ({"fl_x": "5"}, '1 finite numbers under "fl_x"'),
+        ({"fl_x": "5"}, 'a finite number under "fl_x"'),
         ({**TWICE, "h": 12}, r"w, h: expected the shape of the image, 6 × 4, found 12 × 12"),
         ({**TWICE, "w": 0}, "w, h: expected the shape of the image"),
         ({"fl_x": -5}, "fl_x: expected focal lengths in pixels, above 0"),
