@@ -87,31 +87,34 @@ class AstrayView:
 
 def astray(views: Sequence[View], along_rays: bool) -> list[AstrayView]:
     """Single views whose pose or depth is not that of the others, as far as their points tell."""
-    measured = _measured(views)
-    if len(measured) < FEWEST_VIEWS:
-        return []
-    trials = Trials.draw(measured, along_rays)
-    stated = trials.agreement(READINGS[0])
-    tested = stated.agreeing + stated.contradicting
-    shares = stated.contradicting / np.maximum(tested, 1)
-    usual = float(np.median(shares))
-    places = {id(view): index for index, view in enumerate(views)}
+    index, tested, contradicting = _against_others(views, along_rays)
+    shares = contradicting / np.maximum(tested, 1)
+    usual = float(np.median(shares)) if len(shares) else 0.0
     told = (tested >= LEAST_OF_ONE) & (shares > max(ASTRAY, TIMES_MEDIAN * usual))
-    return [AstrayView(places[id(trials.views[k])], float(shares[k]), usual) for k in told.nonzero()[0]]
+    return [AstrayView(int(index[k]), float(shares[k]), usual) for k in told.nonzero()[0]]
 
 
 def alone(views: Sequence[View], along_rays: bool) -> list[int]:
     """Which views no other one shares a place with, where most views share many."""
+    index, tested, _ = _against_others(views, along_rays)
+    if not len(tested) or np.median(tested) < LEAST_OF_ONE:
+        return []
+    return index[tested == 0].tolist()
+
+
+def _against_others(views: Sequence[View], along_rays: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(V,) which of the views have depth, how many of their points others see, and how many of these contradict.
+
+    All empty where too few have it.
+    """
     measured = _measured(views)
     if len(measured) < FEWEST_VIEWS:
-        return []
+        return np.empty(0, int), np.empty(0), np.empty(0)
     trials = Trials.draw(measured, along_rays)
     stated = trials.agreement(READINGS[0])
-    tested = stated.agreeing + stated.contradicting
-    if np.median(tested) < LEAST_OF_ONE:
-        return []
     places = {id(view): index for index, view in enumerate(views)}
-    return [places[id(trials.views[k])] for k in (tested == 0).nonzero()[0]]
+    index = np.array([places[id(view)] for view in trials.views])
+    return index, stated.agreeing + stated.contradicting, stated.contradicting
 
 
 def _measured(views: Sequence[View]) -> list[View]:
