@@ -13,7 +13,7 @@ from raycast import ROOM, Cuboid, room_views, view_of
 from rgspipe.datasets.views import View
 from rgspipe.degradation.degraded_views import degraded
 from rgspipe.degradation.options import ViewErrors
-from rgspipe.evidence.conventions import astray, misread
+from rgspipe.evidence.conventions import AgainstOthers, misread
 from rgspipe.evidence.readings import READINGS, Reading
 
 #: The readings that differ from what is stated in one thing, and COLMAP's own, which differs in two.
@@ -77,11 +77,11 @@ def test_one_view_that_is_elsewhere_is_named(request: pytest.FixtureRequest, vie
     From one side and with noise of 5 % it is 0.12, of which nothing is said.
     """
     given = degraded(request.getfixturevalue(views), ViewErrors(depth_noise=noise))
-    assert astray(given, along_rays=False) == []
+    assert AgainstOthers.of(given, along_rays=False).astray == []
     pose = given[4].camera.camera_to_world.clone()
     pose[:3, 3] += torch.tensor([0.25, 0.0, 0.0])
     moved = replace(given[4], camera=replace(given[4].camera, camera_to_world=pose))
-    found = astray([replace(given[0], depth=None), *given[1:4], moved, *given[5:]], along_rays=False)
+    found = AgainstOthers.of([replace(given[0], depth=None), *given[1:4], moved, *given[5:]], along_rays=False).astray
     assert [one.index for one in found] == [4]
 
 

@@ -24,6 +24,6 @@ def _is_missing(path: Path) -> bool:
     return False
 
 
-def named(paths: Sequence[Path]) -> str:
+def named(paths: Sequence[Path | str]) -> str:
     """The first of them, for a sentence."""
     return ", ".join(str(path) for path in paths[:NAMED]) + (", …" if len(paths) > NAMED else "")

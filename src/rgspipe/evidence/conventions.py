@@ -85,36 +85,47 @@ class AstrayView:
     usual: float
 
 
-def astray(views: Sequence[View], along_rays: bool) -> list[AstrayView]:
-    """Single views whose pose or depth is not that of the others, as far as their points tell."""
-    index, tested, contradicting = _against_others(views, along_rays)
-    shares = contradicting / np.maximum(tested, 1)
-    usual = float(np.median(shares)) if len(shares) else 0.0
-    told = (tested >= LEAST_OF_ONE) & (shares > max(ASTRAY, TIMES_MEDIAN * usual))
-    return [AstrayView(int(index[k]), float(shares[k]), usual) for k in told.nonzero()[0]]
+@dataclass(frozen=True)
+class AgainstOthers:
+    """What the points of each view with depth are to the other views; nothing where too few have it.
 
-
-def alone(views: Sequence[View], along_rays: bool) -> list[int]:
-    """Which views no other one shares a place with, where most views share many."""
-    index, tested, _ = _against_others(views, along_rays)
-    if not len(tested) or np.median(tested) < LEAST_OF_ONE:
-        return []
-    return index[tested == 0].tolist()
-
-
-def _against_others(views: Sequence[View], along_rays: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(V,) which of the views have depth, how many of their points others see, and how many of these contradict.
-
-    All empty where too few have it.
+    Attributes:
+        index: (V,) of these views, among all.
+        tested: (V,) how many of their points others see.
+        contradicting: (V,) how many of these contradict them.
     """
-    measured = _measured(views)
-    if len(measured) < FEWEST_VIEWS:
-        return np.empty(0, int), np.empty(0), np.empty(0)
-    trials = Trials.draw(measured, along_rays)
-    stated = trials.agreement(READINGS[0])
-    places = {id(view): index for index, view in enumerate(views)}
-    index = np.array([places[id(view)] for view in trials.views])
-    return index, stated.agreeing + stated.contradicting, stated.contradicting
+
+    index: np.ndarray
+    tested: np.ndarray
+    contradicting: np.ndarray
+
+    @classmethod
+    def of(cls, views: Sequence[View], along_rays: bool) -> AgainstOthers:
+        measured = _measured(views)
+        if len(measured) < FEWEST_VIEWS:
+            return cls(np.empty(0, int), np.empty(0), np.empty(0))
+        trials = Trials.draw(measured, along_rays)
+        stated = trials.agreement(READINGS[0])
+        places = {id(view): index for index, view in enumerate(views)}
+        index = np.array([places[id(view)] for view in trials.views])
+        return cls(index, stated.agreeing + stated.contradicting, stated.contradicting)
+
+    @property
+    def astray(self) -> list[AstrayView]:
+        """Single views whose pose or depth is not that of the others, as far as their points tell."""
+        if not len(self.index):
+            return []
+        shares = self.contradicting / np.maximum(self.tested, 1)
+        usual = float(np.median(shares))
+        told = (self.tested >= LEAST_OF_ONE) & (shares > max(ASTRAY, TIMES_MEDIAN * usual))
+        return [AstrayView(int(self.index[k]), float(shares[k]), usual) for k in told.nonzero()[0]]
+
+    @property
+    def alone(self) -> list[int]:
+        """Which views no other one shares a place with, where most views share many."""
+        if not len(self.index) or np.median(self.tested) < LEAST_OF_ONE:
+            return []
+        return self.index[self.tested == 0].tolist()
 
 
 def _measured(views: Sequence[View]) -> list[View]:

@@ -7,15 +7,13 @@ from collections.abc import Sequence
 import torch
 
 from rgspipe.capture.refusals import OFF
+from rgspipe.datasets.missing_files import named
 from rgspipe.datasets.views import View
-from rgspipe.evidence.conventions import AstrayView, alone, astray
+from rgspipe.evidence.conventions import AgainstOthers, AstrayView
 from rgspipe.evidence.masks import masked_out
 
 #: A photograph is black whose mean is below this part of the brightest one's of the same lighting.
 BLACK = 1e-3
-
-#: Names that a sentence lists.
-LISTED = 3
 
 
 def tell_odd_views(views: Sequence[View], names: Sequence[str]) -> None:
@@ -38,9 +36,10 @@ def tell_astray(views: Sequence[View], names: Sequence[str], along_rays: bool = 
         names: what the views are called.
         along_rays: whether their files state depth along rays.
     """
-    for one in astray(views, along_rays):
+    others = AgainstOthers.of(views, along_rays)
+    for one in others.astray:
         print(f"warning: {names[one.index]}: {_contradiction(one)}")
-    for index in alone(views, along_rays):
+    for index in others.alone:
         print(
             f"warning: {names[index]}: none of its points is seen by other views, which see each other's: its pose or "
             "depth is off, or it shows what no other does. Mend it or leave it out"
@@ -67,8 +66,9 @@ def _black(views: Sequence[View], names: Sequence[str]) -> str:
     ]
     if not black:
         return ""
-    listed = ", ".join(black[:LISTED]) + (", …" if len(black) > LISTED else "")
-    return f"{listed}: black, as if no light had been on, while others are not. Photograph it again or leave it out"
+    return (
+        f"{named(black)}: black, as if no light had been on, while others are not. Photograph it again or leave it out"
+    )
 
 
 def _masked_out(views: Sequence[View]) -> str:

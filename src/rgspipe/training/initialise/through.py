@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 
 from rgspipe.datasets.views import View
 
@@ -42,27 +43,21 @@ def _went_on(view: View, places: np.ndarray, normals: np.ndarray, beyond: float)
     A pixel's ray is the one through its middle, which may go past an edge that the place is before: all four around a
     place must have gone on.
     """
-    camera, depth = view.camera, view.depth.detach().cpu().double().numpy()
-    pose = camera.camera_to_world.double().cpu().numpy()
-    rotation, origin = pose[:3, :3], pose[:3, 3]
-    local, heights = (places - origin) @ rotation, np.einsum("md,md->m", origin - places, normals)
-    away = -local[:, 2]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        column = np.floor(camera.cx + camera.fx * local[:, 0] / away - 0.5)
-        row = np.floor(camera.cy - camera.fy * local[:, 1] / away - 0.5)
-    inside = (column >= 0) & (column < camera.width - 1) & (row >= 0) & (row < camera.height - 1)
+    camera, depth = view.camera, view.depth.detach().cpu().double().numpy().reshape(-1)
+    pixels, away = (part.numpy() for part in camera.project(torch.from_numpy(places)))
+    corner = np.floor(pixels - 0.5)
+    heights = np.einsum("md,md->m", camera.origin.double().numpy() - places, normals)
+    inside = (corner >= 0.0).all(axis=1) & (corner < [camera.width - 1, camera.height - 1]).all(axis=1)
     asked = np.flatnonzero((away > 0.0) & (heights > 0.0) & inside)
+    column, row = corner[asked].astype(np.int64).T
     went_on = np.ones(len(asked), dtype=bool)
     for right, lower in itertools.product((0, 1), repeat=2):
-        across, down = column[asked].astype(np.int64) + right, row[asked].astype(np.int64) + lower
+        pixel = (row + lower) * camera.width + column + right
+        _, directions, lengths = (part.numpy() for part in camera.rays(torch.from_numpy(pixel)))
         # Of planar depth 1, so that depths are lengths along it.
-        rays = np.stack(
-            [(across + 0.5 - camera.cx) / camera.fx, -(down + 0.5 - camera.cy) / camera.fy, -np.ones(len(asked))],
-            axis=1,
-        )
-        towards = -np.einsum("md,md->m", rays @ rotation.T, normals[asked])
+        towards = -lengths * np.einsum("md,md->m", directions, normals[asked])
         # A depth that is not known tells nothing.
-        went_on &= (towards > 0.0) & (depth[down, across] * towards - heights[asked] > beyond)
+        went_on &= (towards > 0.0) & (depth[pixel] * towards - heights[asked] > beyond)
     found = np.zeros(len(places), dtype=bool)
     found[asked] = went_on
     return found
