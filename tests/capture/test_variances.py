@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drawn_fields import drawn
 from photographed_room import painted_room
 from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.variances import with_likely_variances
@@ -20,14 +21,6 @@ def graph() -> Graph:
     return Graph.of(surfels, np.full((len(surfels), 3), 0.5))
 
 
-def drawn(graph: Graph, rough: np.ndarray, grain: np.ndarray, true: Variances = TRUE) -> np.ndarray:
-    """(N, 3) residuals of surfaces that are as rough and as grainy (S,) as that."""
-    rng, count = np.random.default_rng(0), len(graph.sizes)
-    root = np.linalg.cholesky(np.linalg.inv(graph.precision(true, rough).toarray()))
-    noise = np.sqrt(true.noise * grain[graph.surfaces])[:, None]
-    return root @ rng.normal(size=(count, 3)) + noise * rng.normal(size=(count, 3))
-
-
 def unknown(graph: Graph) -> Field:
     return Field(graph, np.zeros(len(graph.sizes)), np.ones(len(graph.sizes)), Variances())
 
@@ -37,7 +30,7 @@ def alike(graph: Graph) -> np.ndarray:
 
 
 def test_variances_are_those_that_a_field_was_drawn_with(graph: Graph) -> None:
-    residual = drawn(graph, alike(graph), alike(graph))
+    residual = drawn(graph, alike(graph), alike(graph), TRUE)
     found = with_likely_variances(unknown(graph), residual)
     assert found.variances.noise == pytest.approx(TRUE.noise, rel=0.15)  # 1.03
     # What one draw of twelve surfaces tells of their smooth part and of their means.
@@ -61,7 +54,7 @@ def test_a_wall_that_differs_is_told_from_plain_ones(graph: Graph, rough: float,
     """Paint that is rough on one wall, and noise that is: the other walls, of 196 surfels each, stay as they are."""
     walls = np.bincount(graph.surfaces) > 100
     factors = np.where(np.arange(len(walls)) == walls.argmax(), np.array([[rough], [grain]]), 1.0)
-    residual, found = drawn(graph, *factors), unknown(graph)
+    residual, found = drawn(graph, *factors, TRUE), unknown(graph)
     for _ in range(3):  # as a search does, which goes on from them
         found = with_likely_variances(found, residual)
     true = replace(found, variances=TRUE, rough=factors[0], grain=factors[1])
@@ -77,7 +70,7 @@ def test_a_wall_that_differs_is_told_from_plain_ones(graph: Graph, rough: float,
 
 
 def test_what_no_other_surfel_says_counts_little(graph: Graph) -> None:
-    residual = drawn(graph, alike(graph), alike(graph))
+    residual = drawn(graph, alike(graph), alike(graph), TRUE)
     residual[100] += 20.0 * np.sqrt(TRUE.noise)
     trust = with_likely_variances(unknown(graph), residual, trusting=True).trust
     assert trust[100] < 0.05  # 0.010

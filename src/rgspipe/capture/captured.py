@@ -18,6 +18,7 @@ from rgspipe.capture.field import Field, Graph, Variances
 from rgspipe.capture.lamps import LampProblem
 from rgspipe.capture.oddities import Oddities
 from rgspipe.capture.options import CaptureOptions
+from rgspipe.capture.patches import with_patches
 from rgspipe.capture.photographs import SHOWN, Numbers
 from rgspipe.capture.prediction import Prediction
 from rgspipe.capture.radiance import DRAWS, Measured, measured_radiance
@@ -236,14 +237,16 @@ def _problem(
 
 
 def _captured(measured: Measured, answer: FoundLamps, options: CaptureOptions, lighting: str) -> Captured:
-    best, frozen = answer.best, answer.best.problem.frozen
-    albedo = torch.from_numpy(np.clip(best.problem.albedo(best.lamps), *ALBEDO_RANGE)).float()
-    doubt = torch.from_numpy(best.problem.field.deviation(DRAWS, options.seed)).float()
-    surfels = frozen.surfels
+    problem, lamps = answer.best.problem, answer.best.lamps
+    frozen, surfels = problem.frozen, problem.frozen.surfels
+    field, either = with_patches(problem.field, problem.residual(lamps), problem.receivers.surfels)
+    problem = replace(problem, field=field)
+    albedo = torch.from_numpy(np.clip(problem.albedo(lamps), *ALBEDO_RANGE)).float()
+    doubt = torch.from_numpy(np.sqrt(field.deviation(DRAWS, options.seed) ** 2 + either)).float()
     guessed = torch.where(surfels.guessed > 0.0, doubt.clamp(min=LEAST_DOUBT), 0.0)
     surfels = replace(surfels, albedo=albedo, guessed=guessed)
     certainty = Certainty.of(answer)
-    oddities = Oddities.of(best.problem, best.lamps, measured)
+    oddities = Oddities.of(problem, lamps, measured)
     return Captured(
-        surfels, best.lamps.lights(), certainty, doubt, measured, answer, frozen, oddities, Said.of(options), lighting
+        surfels, lamps.lights(), certainty, doubt, measured, answer, frozen, oddities, Said.of(options), lighting
     )

@@ -85,12 +85,20 @@ class Graph:
         weight = pairs.weight.double().numpy()
         apart = np.abs(np.log(predicted[first]) - np.log(predicted[second])).max(axis=1)
         weight = weight / (1.0 + (apart / PAINT) ** 2)
+        return cls._between(first, second, weight, surfels)
+
+    @classmethod
+    def _between(cls, first: np.ndarray, second: np.ndarray, weight: Numbers, surfels: Surfels) -> Graph:
         joined, count = weight > APART, len(surfels)
         adjacency = sp.coo_matrix((weight[joined], (first[joined], second[joined])), (count, count))
         labels = connected_components(adjacency, directed=False)[1]
         graph = cls(first, second, weight, labels)
         places, normals = (part.double().cpu().numpy() for part in (surfels.centers, surfels.normals))
         return replace(graph, bent=off_planes(places, normals, graph._inner_edges))
+
+    def without(self, apart: NDArray[np.bool_], surfels: Surfels) -> Graph:
+        """With the neighbours that are `apart` (E,) as none, and the surfaces that this leaves."""
+        return self._between(self.first, self.second, np.where(apart, 0.0, self.weight), surfels)
 
     @kept_property
     def sizes(self) -> Numbers:

@@ -1,0 +1,174 @@
+"""Patches of other paint on what counts as one surface: a rug, a picture, the black inside of a fireplace.
+
+Steps of the field within a surface are Gaussian and measurements Student's t, so that a patch which differs much from
+what is around it would be taken for outliers, each of its surfels alone. So neighbours are taken apart whose measured
+values z differ by more than ν of their variance, beyond which Student's t gives a step less than half of its weight.
+What that leaves of a surface beside its largest part are islands. An island is paint where its rim is likelier than so
+many outliers, and a surface of its own then:
+
+    ½ (ν + 1) Σ_i log(1 + r_i² / (ν v_i))  >  ½ (ν + 1) Σ_(i,j) c_ij log(1 + (z_i − z_j)² / (ν v_ij)) ,
+
+i in the island and i, j across its rim; r_i what its measurements are off what the rest of the surface tells of their
+place, v their variances, and c_ij the numbers that a pair of neighbours holds: n surfels have as many, and many more
+pairs. A compact patch has a short rim; single surfels and thin lines of them are outliers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+from scipy.special import expit
+from scipy.stats import chi2
+
+from rgspipe.capture.field import APART, Field
+from rgspipe.capture.photographs import Numbers
+from rgspipe.capture.side_by_side import kept_property
+from rgspipe.capture.variances import FREEDOM, with_likely_variances
+from rgspipe.scene.surfels import Surfels
+
+#: Median of the square of a normal number of variance 1: channels are taken to differ alike.
+MIDDLE = float(chi2.median(1))
+
+#: Rounds in which the variances of surfaces with patches of their own and the outliers on them follow.
+ROUNDS = 3
+
+
+def with_patches(field: Field, residual: Numbers, surfels: Surfels) -> tuple[Field, Numbers]:
+    """The field with patches of other paint as surfaces of their own, and what is not known by taking them for that.
+
+    Args:
+        field: with the variances and the trust that belong to it.
+        residual: (N, 3) what was measured of it.
+        surfels: the N that it is of.
+
+    Returns:
+        field: the same one if there are no patches.
+        doubt: (N,) variance of its values by what may be paint or outliers, beside the field's own.
+    """
+    islands = _Islands(field, residual)
+    if islands.are_paint.any():
+        field = islands.apart(surfels)
+        for _ in range(ROUNDS):
+            field = with_likely_variances(field, residual, trusting=True)
+    return field, islands.doubt
+
+
+@dataclass(frozen=True, eq=False)
+class _Islands:
+    """The islands of a field by residuals (N, 3); number 0 is what is of none."""
+
+    field: Field
+    residual: Numbers
+
+    @kept_property
+    def are_paint(self) -> NDArray[np.bool_]:
+        """(I,) bool."""
+        return self._chance > 0.5
+
+    @property
+    def doubt(self) -> Numbers:
+        """(N,) variance of the values of surfels that are either paint or outliers."""
+        chance = self._chance[self._numbers]
+        return chance * (1.0 - chance) * self._off
+
+    def apart(self, surfels: Surfels) -> Field:
+        """The field with what is paint as surfaces of their own, and all measurements trusted alike."""
+        before, numbers = self.field.graph, np.where(self.are_paint[self._numbers], self._numbers, 0)
+        numbers = self._with_unmeasured(numbers)
+        graph = before.without(numbers[before.first] != numbers[before.second], surfels)
+        _, one_of = np.unique(graph.surfaces, return_index=True)
+        former = before.surfaces[one_of]
+        rough, grain = (None if own is None else own[former] for own in (self.field.rough, self.field.grain))
+        return replace(self.field, graph=graph, rough=rough, grain=grain, trust=self._measured.astype(np.float64))
+
+    @kept_property
+    def _measured(self) -> NDArray[np.bool_]:
+        """(N,) bool."""
+        measured = np.isfinite(self.field.measured)
+        return measured if self.field.told is None else measured & self.field.told.any(axis=1)
+
+    @kept_property
+    def _compared(self) -> NDArray[np.bool_]:
+        """(E,) neighbours that are both measured."""
+        graph = self.field.graph
+        return self._measured[graph.first] & self._measured[graph.second] & (graph.weight > APART)
+
+    @kept_property
+    def _variance(self) -> Numbers:
+        """(N,) of the measurements, if all surfaces are alike."""
+        return self.field.measured + self.field.variances.noise
+
+    @kept_property
+    def _steps(self) -> Numbers:
+        """(E,) squares of measured steps over their variance, if surfaces are alike; 0 where one is not measured."""
+        graph = self.field.graph
+        squares = ((self.residual[graph.first] - self.residual[graph.second]) ** 2).mean(axis=1)
+        expected = self.field.variances.step / np.maximum(graph.weight, APART)
+        expected = expected + self._variance[graph.first] + self._variance[graph.second]
+        return np.divide(squares, expected, out=np.zeros_like(squares), where=self._compared)
+
+    @kept_property
+    def _scale(self) -> Numbers:
+        """(N,) factor of the variances of each one's surface, by the middle one of its steps: few are across a rim."""
+        surfaces = self.field.graph.surfaces
+        of = surfaces[self.field.graph.first][self._compared]
+        steps = pd.Series(self._steps[self._compared]).groupby(of)
+        middle, count = (part.reindex(np.arange(surfaces.max() + 1)) for part in (steps.median(), steps.size()))
+        scale = (FREEDOM + (count * middle).fillna(0.0) / MIDDLE) / (FREEDOM + count.fillna(0.0))
+        return scale.to_numpy()[surfaces]
+
+    @kept_property
+    def _far(self) -> Numbers:
+        """(E,) the same over ν, of surfaces as they are."""
+        return self._steps / (FREEDOM * self._scale[self.field.graph.first])
+
+    @kept_property
+    def _numbers(self) -> NDArray[np.integer]:
+        """(N,) the island that each is on."""
+        graph, count = self.field.graph, len(self.residual)
+        near = self._compared & (self._far < 1.0)
+        pairs = sp.coo_matrix((np.ones(int(near.sum())), (graph.first[near], graph.second[near])), (count, count))
+        parts = connected_components(pairs, directed=False)[1]
+        by_size = np.argsort(np.bincount(parts)[parts], kind="stable")
+        largest = np.empty(graph.surfaces.max() + 1, dtype=parts.dtype)
+        largest[graph.surfaces[by_size]] = parts[by_size]
+        numbers = np.where(self._measured & (parts != largest[graph.surfaces]), parts + 1, 0)
+        return np.unique(numbers, return_inverse=True)[1]
+
+    @kept_property
+    def _off(self) -> Numbers:
+        """(N,) squares of what measurements on islands are off what all others tell of their place; 0 elsewhere."""
+        island = self._numbers > 0
+        rest = self.field.trusted(np.where(island, 0.0, self.field.trust))
+        return np.where(island, ((self.residual - rest.mean_colours(self.residual)) ** 2).mean(axis=1), 0.0)
+
+    @kept_property
+    def _chance(self) -> Numbers:
+        """(I,) that an island is paint."""
+        outliers = np.bincount(self._numbers, np.log1p(self._off / (FREEDOM * self._scale * self._variance)))
+        chance = expit(0.5 * (FREEDOM + 1.0) * (outliers - self._rims(len(outliers))))
+        return np.where(np.arange(len(chance)) > 0, chance, 0.0)
+
+    def _rims(self, count: int) -> Numbers:
+        """(I,) what the steps across the rim of each of `count` islands cost."""
+        graph, numbers = self.field.graph, self._numbers
+        of = graph.surfaces[graph.first]
+        pairs = np.maximum(np.bincount(of, 0.5 * graph.weight, graph.surfaces.max() + 1), APART)
+        held = (np.bincount(graph.surfaces) / pairs)[of] * graph.weight
+        across = numbers[graph.first] != numbers[graph.second]
+        return np.bincount(numbers[graph.first[across]], (held * np.log1p(self._far))[across], count)
+
+    def _with_unmeasured(self, numbers: NDArray[np.integer]) -> NDArray[np.integer]:
+        """Numbers (N,), those of what was not measured as the nearest that was has them."""
+        graph, numbers, known = self.field.graph, numbers.copy(), self._measured.copy()
+        order = np.argsort(graph.weight, kind="stable")
+        first, second = (part[order][graph.weight[order] > APART] for part in (graph.first, graph.second))
+        while (reached := ~known[first] & known[second]).any():
+            numbers[first[reached]] = numbers[second[reached]]
+            known[first[reached]] = True
+        return numbers
