@@ -155,6 +155,43 @@ def test_a_surfel_that_was_seen_to_end_elsewhere_keeps_its_end() -> None:
     np.testing.assert_allclose(cut.clip_offsets[last, 0], photographed.clip_offsets[last, 0], atol=1e-6)
 
 
+def seen_floor(gap: float, guess) -> tuple[np.ndarray, Surfels]:
+    """Offsets of the last surfels of a floor that was seen to end at 0, with what was guessed `gap` distances on."""
+    floor = face(2, 1.0, (-HALF, -HALF), (0.0, HALF), at=0.0)
+    beyond = guess(gap * SPACING)
+    places, normals = (np.concatenate([floor[k], beyond[k]]) for k in (0, 1))
+    axes = quaternion_to_axes(quaternion_from_normal(torch.from_numpy(normals))).numpy()[:, :2]
+    offsets, angles = nowhere(len(places))
+    last = np.flatnonzero(np.isclose(floor[0][:, 0], -0.5 * SPACING))
+    offsets[last, 0], angles[last, 0] = 0.3 * SPACING, np.arctan2(axes[last, 1, 0], axes[last, 0, 0])
+    result = ends(places, normals, axes, offsets, angles, len(floor[0]), SPACING)
+    return result.offsets[last, 0], surfels_of(places, normals, result.offsets, result.angles, result.kept)
+
+
+def test_a_floor_that_goes_on_under_what_hides_it_has_no_end_there() -> None:
+    """It ended where photographs did, and left a slit before the nearest guess, through which one saw the void."""
+    last, surfels = seen_floor(1.0, lambda at: face(2, 1.0, (at, -HALF), (HALF, HALF), at=0.0))
+    assert (last == NO_CLIP).all()
+    x, y = torch.meshgrid(torch.linspace(-0.2, 0.2, 201), torch.linspace(-0.3, 0.3, 31), indexing="ij")
+    above = torch.stack([x, y, torch.ones_like(x)], dim=-1).reshape(-1, 3)
+    hits = composite(SurfelBvh(surfels), above, torch.tensor([0.0, 0.0, -1.0]).expand_as(above))
+    assert float((hits.transmittance > 0.5).float().mean()) < 0.005  # 0; 0.05 with the ends
+
+
+@pytest.mark.parametrize(
+    "guess",
+    [
+        lambda at: face(2, 1.0, (at, -HALF), (HALF, HALF), at=-1.5 * SPACING),  # a lower step
+        lambda at: face(0, 1.0, (-HALF, -0.4), (HALF, -0.1), at=at),  # a face that stands on it
+        lambda at: face(2, -1.0, (at, -HALF), (HALF, HALF), at=0.0),  # what faces the other way
+        lambda at: face(2, 1.0, (at + 3.0 * SPACING, -HALF), (HALF, HALF), at=0.0),  # a floor farther away
+    ],
+)
+def test_a_surface_ends_before_what_is_not_its_own(guess) -> None:
+    last, _ = seen_floor(0.6, guess)
+    np.testing.assert_allclose(last, 0.3 * SPACING)
+
+
 def test_without_surfels_nothing_ends() -> None:
     nothing = ends(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2, 3)), *nowhere(0), 0, SPACING)
     assert len(nothing.kept) == 0

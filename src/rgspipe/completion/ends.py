@@ -23,6 +23,9 @@ from rgspipe.scene.surfels import NO_CLIP
 #: other, in distances of surfels.
 NEAR, AROUND = 2.5, 4.0
 
+#: What goes on past a surfel's end is no more than so many distances aside: a row of surfels beside its own.
+ASIDE = 1.0
+
 #: Surfels on one plane are within so many distances of it.
 ON_PLANE = 0.5
 
@@ -82,12 +85,15 @@ def ends(
         lists = tree.query_ball_point(centers[chosen], AROUND * spacing, return_sorted=True)
         for own, near in zip(chosen, lists, strict=True):
             around = np.asarray(near)
-            # What is guessed may be wrong, and says nothing of where others end that were seen.
-            around = around[around < seen] if own < seen else around
+            away = (centers[around] - centers[own]) / spacing
             known = [(offsets[own, k] / spacing, outward[own, k]) for k in np.flatnonzero(offsets[own] < NO_CLIP)]
-            edges = _edges((centers[around] - centers[own]) / spacing, normals[around], normals[own])
+            # What is guessed may be wrong, and tells of others that were seen no more than where these go on.
+            told = (around < seen) | (own >= seen)
+            edges = _edges(away[told], normals[around[told]], normals[own])
             if own < seen:
                 edges = _agreed(edges, known)
+                beyond, facing = away[~told], normals[around[~told]]
+                known = [end for end in known if not _goes_on(end, beyond, facing, normals[own])]
             rest = [end for end in known if not any(_is_along(end, edge) for edge in edges)]
             for place, (offset, way) in enumerate(sorted([*edges, *rest], key=lambda end: end[0])[:MOST]):
                 found.kept[own] &= own < seen or offset > 0.0
@@ -103,6 +109,21 @@ def _agreed(edges: list[End], own: list[End]) -> list[End]:
         for edge in edges
         if edge[0] > 0.0 and all(abs(edge[0] - end[0]) < ON_PLANE for end in own if _is_along(end, edge))
     ]
+
+
+def _goes_on(end: End, away: np.ndarray, facing: np.ndarray, normal: np.ndarray) -> bool:
+    """Whether a surface was continued past an end, as where what hides the rest of it stands.
+
+    Args:
+        away: (K, 3) from the surfel's centre, in distances of neighbours, of what was guessed around it.
+        facing: (K, 3) the normals of that.
+        normal: (3,) its own.
+    """
+    offset, way = end
+    along = away @ way
+    aside = np.linalg.norm(np.cross(away, way), axis=1)
+    flat = (facing @ normal > ACROSS) & (np.abs(away @ normal) < ON_PLANE)
+    return bool((flat & (along > offset) & (along < NEAR) & (aside < ASIDE)).any())
 
 
 def _is_along(end: End, other: End) -> bool:
