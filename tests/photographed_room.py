@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import torch
 
 from lit_room import room_surfels
@@ -60,12 +61,12 @@ def photographs(lamps: tuple[PointLight, ...] = LAMPS, count: int = 14, resoluti
 
 
 def radiance_under(
-    lamps: tuple[PointLight, ...], emission: torch.Tensor | None = None, darker: float = 1.0
+    lamps: tuple[PointLight, ...], emission: torch.Tensor | None = None, darker: float | np.ndarray = 1.0
 ) -> torch.Tensor:
     """(N, 3) of the painted room's surfels with all bounces, where some surfaces may glow by themselves (N, 3).
 
     Args:
-        darker: what the paint is multiplied by.
+        darker: what the paint is multiplied by, or (N, 1) that of each surfel.
     """
     frozen, albedo = frozen_room(), darker * painted_room().albedo.double().numpy()
     irradiance, _ = frozen.unit_irradiance(torch.stack([lamp.position.double() for lamp in lamps]))

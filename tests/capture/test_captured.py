@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import torch
 
-from photographed_room import LAMPS, painted_room, photographs
+from photographed_room import LAMPS, painted_room, photographs, pictures, radiance_under
 from rgspipe.capture import minima, search
 from rgspipe.capture.captured import Captured, capture_scene
 from rgspipe.capture.certainty import Certainty
@@ -165,3 +165,14 @@ def test_light_that_lamps_and_paint_leave_unexplained_is_told() -> None:
     worse = replace(best, problem=replace(best.problem, field=field))
     words = captured_words(replace(found(), answer=replace(found().answer, best=worse)))
     assert "leave 30 % of a surface's light unexplained" in words
+
+
+def test_a_black_patch_on_a_wall_is_dark() -> None:
+    """A tenth of its wall, blurred by photographs of 40 pixels: it was taken for outliers on what is around it."""
+    away = np.abs(painted_room().centers.double().numpy() - [0.036, -0.5, 0.036])
+    patch = (away < [0.18, 1e-3, 0.18]).all(axis=1)
+    views = pictures(radiance_under(LAMPS[:1], darker=np.where(patch, 0.1, 1.0)[:, None]))
+    captured = capture_scene(views, blank_room(), replace(OPTIONS, count=1))
+    albedo, true = captured.surfels.albedo[: len(patch)].numpy(), painted_room().albedo.numpy()
+    reflected = np.median(albedo[patch] / true[patch])
+    assert reflected < 0.3, reflected  # 0.23; 0.97 as outliers

@@ -8,9 +8,10 @@ many outliers, and a surface of its own then:
 
     ½ (ν + 1) Σ_i log(1 + r_i² / (ν v_i))  >  ½ (ν + 1) Σ_(i,j) c_ij log(1 + (z_i − z_j)² / (ν v_ij)) ,
 
-i in the island and i, j across its rim; r_i what its measurements are off what the rest of the surface tells of their
-place, v their variances, and c_ij the numbers that a pair of neighbours holds: n surfels have as many, and many more
-pairs. A compact patch has a short rim; single surfels and thin lines of them are outliers.
+i in the island, and i, j neighbours of which one or both are; r_i what its measurements are off what the rest of the
+surface tells of their place, v their variances, and c_ij the numbers that a pair of neighbours holds: n surfels have as
+many, and many more pairs. A compact patch has a short rim; single surfels and thin lines of them are outliers. Islands
+that touch and are no paint, each for itself, are asked once more as one: dark paint is measured unevenly.
 """
 
 from __future__ import annotations
@@ -68,12 +69,12 @@ class _Islands:
     @kept_property
     def are_paint(self) -> NDArray[np.bool_]:
         """(I,) bool."""
-        return self._chance > 0.5
+        return self._chances > 0.5
 
     @property
     def doubt(self) -> Numbers:
         """(N,) variance of the values of surfels that are either paint or outliers."""
-        chance = self._chance[self._numbers]
+        chance = self._chances[self._numbers]
         return chance * (1.0 - chance) * self._off
 
     def apart(self, surfels: Surfels) -> Field:
@@ -129,39 +130,55 @@ class _Islands:
 
     @kept_property
     def _numbers(self) -> NDArray[np.integer]:
-        """(N,) the island that each is on."""
-        graph, count = self.field.graph, len(self.residual)
-        near = self._compared & (self._far < 1.0)
-        pairs = sp.coo_matrix((np.ones(int(near.sum())), (graph.first[near], graph.second[near])), (count, count))
-        parts = connected_components(pairs, directed=False)[1]
+        """(N,) the island that each is on; what touches and is no paint, each for itself, is one of uneven paint."""
+        even = self._even_islands
+        outliers = (even > 0) & (self._chance_of(even) <= 0.5)[even]
+        touching = self._parts(outliers[self.field.graph.first] & outliers[self.field.graph.second])
+        return np.unique(np.where(outliers, even.max() + 1 + touching, even), return_inverse=True)[1]
+
+    @kept_property
+    def _even_islands(self) -> NDArray[np.integer]:
+        """(N,) numbers of what steps that are far cut off from the largest part of each surface; 0 for that."""
+        surfaces, parts = self.field.graph.surfaces, self._parts(self._far < 1.0)
         by_size = np.argsort(np.bincount(parts)[parts], kind="stable")
-        largest = np.empty(graph.surfaces.max() + 1, dtype=parts.dtype)
-        largest[graph.surfaces[by_size]] = parts[by_size]
-        numbers = np.where(self._measured & (parts != largest[graph.surfaces]), parts + 1, 0)
+        largest = np.empty(surfaces.max() + 1, dtype=parts.dtype)
+        largest[surfaces[by_size]] = parts[by_size]
+        numbers = np.where(self._measured & (parts != largest[surfaces]), parts + 1, 0)
         return np.unique(numbers, return_inverse=True)[1]
+
+    def _parts(self, joined: NDArray[np.bool_]) -> NDArray[np.integer]:
+        """(N,) numbers of what compared neighbours that are `joined` (E,) tie together."""
+        graph, near = self.field.graph, self._compared & joined
+        ones = np.ones(int(near.sum()))
+        pairs = sp.coo_matrix((ones, (graph.first[near], graph.second[near])), (len(self.residual),) * 2)
+        return connected_components(pairs, directed=False)[1]
 
     @kept_property
     def _off(self) -> Numbers:
         """(N,) squares of what measurements on islands are off what all others tell of their place; 0 elsewhere."""
-        island = self._numbers > 0
+        island = self._even_islands > 0
         rest = self.field.trusted(np.where(island, 0.0, self.field.trust))
         return np.where(island, ((self.residual - rest.mean_colours(self.residual)) ** 2).mean(axis=1), 0.0)
 
     @kept_property
-    def _chance(self) -> Numbers:
+    def _chances(self) -> Numbers:
         """(I,) that an island is paint."""
-        outliers = np.bincount(self._numbers, np.log1p(self._off / (FREEDOM * self._scale * self._variance)))
-        chance = expit(0.5 * (FREEDOM + 1.0) * (outliers - self._rims(len(outliers))))
+        return self._chance_of(self._numbers)
+
+    def _chance_of(self, numbers: NDArray[np.integer]) -> Numbers:
+        """(I,) that an island of those numbers (N,) is paint."""
+        outliers = np.bincount(numbers, np.log1p(self._off / (FREEDOM * self._scale * self._variance)))
+        chance = expit(0.5 * (FREEDOM + 1.0) * (outliers - self._steps_of(numbers, len(outliers))))
         return np.where(np.arange(len(chance)) > 0, chance, 0.0)
 
-    def _rims(self, count: int) -> Numbers:
-        """(I,) what the steps across the rim of each of `count` islands cost."""
-        graph, numbers = self.field.graph, self._numbers
-        of = graph.surfaces[graph.first]
+    def _steps_of(self, numbers: NDArray[np.integer], count: int) -> Numbers:
+        """(I,) what the steps across the rim of each of `count` islands cost, and those within it."""
+        graph = self.field.graph
+        of, own, other = graph.surfaces[graph.first], numbers[graph.first], numbers[graph.second]
         pairs = np.maximum(np.bincount(of, 0.5 * graph.weight, graph.surfaces.max() + 1), APART)
         held = (np.bincount(graph.surfaces) / pairs)[of] * graph.weight
-        across = numbers[graph.first] != numbers[graph.second]
-        return np.bincount(numbers[graph.first[across]], (held * np.log1p(self._far))[across], count)
+        # Pairs within an island are there both ways round.
+        return np.bincount(own, np.where(own == other, 0.5, 1.0) * held * np.log1p(self._far), count)
 
     def _with_unmeasured(self, numbers: NDArray[np.integer]) -> NDArray[np.integer]:
         """Numbers (N,), those of what was not measured as the nearest that was has them."""
