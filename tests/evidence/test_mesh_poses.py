@@ -13,7 +13,7 @@ from lit_room import BOX_CENTER, BOX_SIZE
 from mesh_files import boxes_mesh
 from photographed_room import LAMPS, photographs
 from raycast import ROOM, Cuboid
-from rgspipe.datasets.mesh.file import UPRIGHT
+from rgspipe.datasets.mesh.up import UPRIGHT
 from rgspipe.datasets.views import View
 from rgspipe.evidence.mesh_poses import MeshReading, poses_on_mesh
 from rgspipe.evidence.readings import FLIP

@@ -17,7 +17,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from rgspipe.capture.lamps import NUMBERS, LampProblem, Lamps
 from rgspipe.capture.minima import LIKELY
@@ -25,6 +24,7 @@ from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.search import FoundLamps
 from rgspipe.capture.shared_errors import shared_covariance
 from rgspipe.capture.side_by_side import side_by_side
+from rgspipe.fitting.certainty.regions import quantile
 from rgspipe.scene.grade import TIED
 
 #: Steps of the lamps without one of the scene's parts.
@@ -92,7 +92,7 @@ def _rival_covariance(answer: FoundLamps) -> Numbers:
     moved = np.array([_numbers(problem, rival.tried.lamps) - own for rival in answer.rivals]).reshape(-1, len(own))
     chance = np.array([rival.chance for rival in answer.rivals])
     # The second moment of few that are far away would leave them out of the region.
-    weight = np.where(chance > LIKELY, np.maximum(chance, 1.0 / chi2.ppf(1.0 - LIKELY, df=3)), chance)
+    weight = np.where(chance > LIKELY, np.maximum(chance, 1.0 / quantile(1.0 - LIKELY, 3)), chance)
     return moved.T @ (moved * weight[:, None])
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from scipy.stats import chi2
 
 from rgspipe.datasets.views import View
 from rgspipe.evaluation.rig_errors import match_positions
+from rgspipe.fitting.certainty.regions import quantile
 from rgspipe.scene.lights import LightRig, PointLight
 
 #: Part of truths that a region is to hold.
@@ -47,7 +47,7 @@ def against_truth(
 
 def _inside(lamp: PointLight, true: PointLight, covariance: np.ndarray) -> bool:
     off = (lamp.position - true.position).double().numpy()
-    return bool(off @ np.linalg.solve(covariance, off) <= chi2.ppf(REGION, 3))
+    return bool(off @ np.linalg.solve(covariance, off) <= quantile(REGION, 3))
 
 
 def _in_sight(views: Sequence[View], lamp: PointLight) -> bool:

@@ -13,9 +13,8 @@ from itertools import product
 
 import numpy as np
 import torch
-from scipy.stats import rankdata
 
-from rgspipe.datasets.mesh.file import UPRIGHT
+from rgspipe.datasets.mesh.up import UPRIGHT
 from rgspipe.datasets.views import View
 from rgspipe.evidence.comparison import FEWEST_VIEWS, REMAINDER, clearly_above, plainest
 from rgspipe.evidence.readings import FLIP, Numbers
@@ -147,6 +146,8 @@ class _Trials:
         return pose
 
     def _score(self, index: int, poses: list[Numbers]) -> float:
+        from scipy.stats import rankdata  # slow to import
+
         points, own = self._points(index, poses[index])
         pairs = [self._shared(points, own, other, poses[other]) for other in self.partners[index]]
         here, there = (np.concatenate(parts) for parts in zip(*pairs, strict=True))

@@ -13,9 +13,10 @@ import trimesh
 
 from mesh_files import cuboid_triangles, quarters, textured_square, write_coloured
 from raycast import BLOCK
-from rgspipe.datasets.mesh.file import UPRIGHT, OwnFiles, read_mesh
+from rgspipe.datasets.mesh.file import OwnFiles, read_mesh
 from rgspipe.datasets.mesh.links import mesh_files
 from rgspipe.datasets.mesh.options import MeshOptions
+from rgspipe.datasets.mesh.up import UPRIGHT
 from rgspipe.errors import InputError
 from rgspipe.scene import srgb
 from rgspipe.scene.mesh import TriangleMesh

@@ -26,16 +26,13 @@ from rgspipe.datasets.mesh.paint import check_shares, paint_of
 from rgspipe.datasets.mesh.ply_polygons import with_triangles
 from rgspipe.datasets.mesh.polycam_place import polycam_place
 from rgspipe.datasets.mesh.texture import check_texture
+from rgspipe.datasets.mesh.up import UPRIGHT, is_y_up
 from rgspipe.datasets.ply.header import check_colours, check_rows, check_strips, without_texture
 from rgspipe.datasets.reading_limits import RAISE, reading_limits, timed
 from rgspipe.errors import InputError
 from rgspipe.scene.mesh import Numbers, Paint, TriangleMesh
 
 WHAT = "a triangle mesh (.ply, .obj, .glb or .gltf)"
-
-#: From y up to z up, as Blender and glTF have it: (x, −z, y).
-UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-
 
 #: What is said of materials that have an alphaMode, or in an MTL d or map_d.
 SEE_THROUGH = "Materials of the mesh that one can see through (alphaMode, d, map_d) are taken for opaque."
@@ -73,11 +70,6 @@ def read_mesh(path: str | Path, options: MeshOptions | None = None) -> TriangleM
     if placed is None:
         placed = UPRIGHT if is_y_up(path, options) else np.eye(4)
     return _checked(mesh.moved(scaled @ placed), path)
-
-
-def is_y_up(path: Path, options: MeshOptions) -> bool:
-    """Whether a file is taken for one whose y points up."""
-    return options.up == "y" or (options.up == "auto" and path.suffix.lower() in GLTF)
 
 
 class OwnFiles(trimesh.resolvers.FilePathResolver):

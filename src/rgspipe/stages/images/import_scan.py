@@ -8,13 +8,13 @@ from rgspipe.capture.refusals import OFF, check_views
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.spoken import as_keys
 from rgspipe.datasets.gs3 import load_dataset
-from rgspipe.datasets.mesh.file import read_mesh
 from rgspipe.datasets.mesh.links import mesh_files
 from rgspipe.datasets.scans.frame import Scan
 from rgspipe.datasets.scans.importing import Imported, import_scan
 from rgspipe.datasets.scans.layouts import read_scan
 from rgspipe.errors import InputError
 from rgspipe.renderer.mesh_passes import MeshPasses
+from rgspipe.scene.mesh import TriangleMesh
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.images.mesh_conventions import check_mesh
 from rgspipe.stages.images.odd_views import tell_astray, tell_odd_views
@@ -26,7 +26,7 @@ def run(context: StageContext) -> None:
     """Write a dataset without lights, whose views agree with each other, and with the mesh if there is one."""
     config, options = context.config, context.config.scene.rgbd
     scan = _scan(config)
-    mesh = read_mesh(mesh_path(config), config.scene.mesh) if config.scene.kind == "mesh" else None
+    mesh = _mesh(config) if config.scene.kind == "mesh" else None
     imported = import_scan(scan, options, context.folder, None if mesh is None else MeshPasses(mesh).seen_by)
     views = load_dataset(context.folder, targets=False).train
     check_views(views, scan.stated)
@@ -42,6 +42,12 @@ def run(context: StageContext) -> None:
     for words in (imported.words(scan.layout), *(() if mesh is None else mesh.remarks)):
         print(as_keys(words))
     context.note(layout=scan.layout, frames=imported.frames, with_depth=imported.with_depth, exif=imported.exif)
+
+
+def _mesh(config: RgspipeConfig) -> TriangleMesh:
+    from rgspipe.datasets.mesh.file import read_mesh  # slow to import (trimesh), and captures have none
+
+    return read_mesh(mesh_path(config), config.scene.mesh)
 
 
 def _require_depth(scan: Scan, imported: Imported) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from rgspipe.datasets.mesh.file import is_y_up
 from rgspipe.datasets.mesh.options import MeshOptions
+from rgspipe.datasets.mesh.up import is_y_up
 from rgspipe.datasets.scans.frame import Scan
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
