@@ -9,15 +9,16 @@ from pathlib import Path
 
 import pytest
 
+# Two test workers on two cores: more threads than one each only get in each other's way. Said before torch is imported,
+# which reads it then: in one process without workers the tests had as many threads as cores.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 from tiny_dataset import change, dataset
 from warm_start import WarmStart
 
 __all__ = ["change", "dataset"]
 
 pytest_plugins = ["cpu_times"]
-
-# Two test workers on two cores: more threads than one each only get in each other's way.
-os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 TESTS = Path(__file__).resolve().parent
 
