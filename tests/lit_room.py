@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import torch
 
 from rgspipe.renderer.frozen import FrozenScene
@@ -40,10 +42,13 @@ def room_surfels() -> Surfels:
     return surfels_on(torch.cat([walls.centers, points]), torch.cat([walls.normals, normals]), SPACING, albedo)
 
 
+@cache
 def frozen_room() -> FrozenScene:
+    """The room, of which no test changes anything: frozen once a process, in 0.4 CPU seconds."""
     return FrozenScene.freeze(room_surfels(), gather_rays=64, patches=150, seed=0)
 
 
+@cache
 def frozen_cube() -> FrozenScene:
     """The outside of a cube of side 0.5, in empty space."""
     albedo = torch.tensor([0.6, 0.5, 0.4], dtype=torch.float64)

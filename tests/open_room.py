@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import torch
 
@@ -32,6 +33,7 @@ def frozen_hole() -> FrozenScene:
     return FrozenScene.freeze(kept, gather_rays=64, patches=150, seed=0).with_dictionary(6)
 
 
+@cache
 def frozen_open_room() -> FrozenScene:
     return FrozenScene.freeze(open_surfels(), gather_rays=64, patches=150, seed=0).with_dictionary(6)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import torch
 
@@ -42,10 +43,15 @@ def photographed(surfels: Surfels, cameras: Sequence[Camera], lamps: Sequence[Po
 
 def painted_views() -> list[View]:
     """Sixteen 32² views from inside, each with a light of its own."""
+    return list(_painted_views())
+
+
+@cache
+def _painted_views() -> tuple[View, ...]:
     generator = torch.Generator().manual_seed(0)
     cameras, lamps = [], []
     for _ in range(16):
         origin, target, light = (0.7 * (torch.rand(3, generator=generator) - 0.5) for _ in range(3))
         cameras.append(Camera.from_field_of_view(look_at(origin, target - origin), 1.6, 32, 32))
         lamps.append(PointLight(light.double(), torch.tensor([1.0, 0.8, 1.2], dtype=torch.float64)))
-    return photographed(painted_box(), cameras, lamps)
+    return tuple(photographed(painted_box(), cameras, lamps))

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import ast
 import difflib
-import gc
-import importlib
-import sys
 from pathlib import Path
-from types import ModuleType
 
 from rgspipe.errors import InputError
+from rgspipe.machine.imports import imported
 from rgspipe.stages.base import Need, Stage, StageContext
 
 __all__ = ["NAMES", "ROOMS", "Need", "Stage", "StageContext", "load_stage", "stage_summary"]
@@ -49,24 +46,7 @@ def load_stage(name: str) -> Stage:
         near = near_stage(name)
         remedy = f"Did you mean stage={near}?" if near else "Choose one of them: stage=NAME."
         raise InputError("stage", expected=f"one of {', '.join(NAMES)}", found=repr(name), remedy=remedy)
-    return _imported(f"{__name__}.{_room(name)}.{name}").STAGE
-
-
-def _imported(name: str) -> ModuleType:
-    """A module, with torch and all else that it imports, while no garbage is collected.
-
-    What is imported stays, and every collection would go through all of it: a seventh of the time that imports take.
-    """
-    if name in sys.modules:
-        return sys.modules[name]
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        return importlib.import_module(name)
-    finally:
-        gc.freeze()  # nor do later collections
-        if collects:
-            gc.enable()
+    return imported(f"{__name__}.{_room(name)}.{name}").STAGE
 
 
 def near_stage(word: str) -> str | None:
