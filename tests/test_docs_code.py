@@ -23,9 +23,10 @@ SCENES = ("tutorial", "cornell")
 #: Pixels of the photographs that the tutorial trains on: enough depth for the surfels that it asks for.
 SIDE = 48
 
-#: What is smaller here than in the tutorial, where nobody waits for it: the images that it renders, and the scene that
-#: it trains, which takes 14 CPU seconds and takes 26 as it is written.
-SMALL = {"width=128, height=128": "width=40, height=40", "surfels=2000": "surfels=600"}
+#: What is smaller here than in the tutorial and the guide, where nobody waits for it: images that are rendered, and
+#: scenes that are made of photographs. The guide's capture takes 7 CPU seconds, and with 600 surfels 26.
+SMALL_TUTORIAL = {"width=128, height=128": "width=40, height=40", "surfels=2000": "surfels=600"}
+SMALL_CAPTURE = {"5000": "300"}
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,15 @@ def run(code: list[str], page: str, **names: object) -> dict[str, object]:
 
 def blocks(page: str) -> list[str]:
     return BLOCK.findall((ROOT / page).read_text())
+
+
+def smaller(page: str, changes: dict[str, str]) -> list[str]:
+    """The blocks of a page, with numbers that are written there replaced."""
+    code = blocks(page)
+    for written, small in changes.items():
+        assert any(written in block for block in code), f"{page} says {written} no longer"
+        code = [block.replace(written, small) for block in code]
+    return code
 
 
 def photographs(scene: rg.FrozenScene, root: Path, known: bool = True) -> None:
@@ -100,11 +110,7 @@ def test_thresholds_are_changed_as_the_guide_says(scene: rg.FrozenScene) -> None
 def test_the_tutorial_runs(folder: Path, scene: rg.FrozenScene, capsys) -> None:
     photographs(scene, folder / "my_room")
     page = "docs/tutorial/python.md"
-    code = blocks(page)
-    for written, small in SMALL.items():
-        assert any(written in block for block in code), f"the tutorial says {written} no longer"
-        code = [block.replace(written, small) for block in code]
-    names = run(code, page)
+    names = run(smaller(page, SMALL_TUTORIAL), page)
     assert names["image"].shape == (40, 40, 3)
     printed = capsys.readouterr().out
     assert printed.startswith("1 light, converged") and "may not be there" in printed and "light_spare" in printed
@@ -117,6 +123,6 @@ def test_the_tutorial_runs(folder: Path, scene: rg.FrozenScene, capsys) -> None:
 def test_a_capture_runs_as_the_guide_says(folder: Path, scene: rg.FrozenScene, capsys) -> None:
     photographs(scene, folder / "my_room", known=False)
     page = "docs/guides/photographs.md"
-    names = run([block.replace("5000", "600") for block in blocks(page)], page)
+    names = run(smaller(page, SMALL_CAPTURE), page)
     assert capsys.readouterr().out.startswith("(PointLight(")
     assert torch.equal(names["scene"].surfels.albedo, names["found"].surfels.albedo)
