@@ -12,6 +12,7 @@ from rgspipe.fitting import FitViews
 from rgspipe.renderer import frozen
 from rgspipe.renderer.dictionary import build_dictionary
 from rgspipe.renderer.frozen import FrozenScene
+from rgspipe.renderer.repainted import repainted
 
 #: Of a room whose ceiling no camera sees.
 CAMERAS = [
@@ -74,12 +75,12 @@ def test_images_that_the_model_itself_made_may_be_noisy(scene: FrozenScene) -> N
     assert usual.lights[0].position.tolist() == never.lights[0].position.tolist()
 
 
-def test_patches_that_explain_a_little_more_by_noise_are_not_believed(scene: FrozenScene) -> None:
+def test_patches_that_explain_a_little_more_by_noise_are_not_believed(scene: FrozenScene, truth: FrozenScene) -> None:
     """Of a room whose paint is up to a quarter off: there noise, too, explains a part of what is wrong."""
     surfels = scene.surfels
     waves = 9.0 * surfels.centers.double() @ torch.tensor([[1.0, 0.3, 0.0], [0.2, 1.0, 0.5], [0.0, 0.4, 1.0]]).double()
     albedo = surfels.albedo * (1.0 + 0.25 * waves.sin().prod(dim=1, keepdim=True)).to(surfels.albedo)
-    painted = FrozenScene.freeze(replace(surfels, albedo=albedo.clamp(max=0.95)), gather_rays=2048, patches=2500)
+    painted = repainted(truth, replace(surfels, albedo=albedo.clamp(max=0.95)), patches=2500)
     lamp = rg.PointLight([0.398, 0.46, 0.079], 1.0)
     images = [painted.render(camera, lamp) for camera in CAMERAS]
     views = FitViews.prepare(scene, CAMERAS)
