@@ -44,6 +44,7 @@ def errors(captured: Captured) -> tuple[np.ndarray, np.ndarray]:
     return np.array(distances), np.array([float(a.intensity.mean() / b.intensity.mean()) for a, b in pairs])
 
 
+@pytest.mark.slow
 def test_both_lamps_are_found_and_no_third() -> None:
     assert len(found().lamps) == 2
     distances, ratios = errors(found())
@@ -66,6 +67,7 @@ def test_exposures_that_nobody_spoke_of_are_told() -> None:
     assert "differ in exposure, by a factor of up to 1.50" in words and "26 % darker in their corners" in words
 
 
+@pytest.mark.slow
 def test_lamps_that_are_looked_for_on_a_part_of_the_surfels_are_the_same() -> None:
     again = capture_scene(photographs(), blank_room(), replace(OPTIONS, search_surfels=400))
     assert len(again.answer.best.problem.radiance) == len(found().surfels)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 import torch
 
 from photographed_room import LAMPS, painted_room, pictures, radiance_under
@@ -47,6 +48,7 @@ def test_a_plain_room_has_nothing_odd() -> None:
     assert "would have to reflect" not in words and "mirror" not in words and "of all: a lamp" not in words
 
 
+@pytest.mark.slow
 def test_light_that_is_the_same_everywhere_tells_of_no_lamp() -> None:
     found = captured(pictures(0.4 * painted_room().albedo))
     assert found.answer.over_even < 0.2

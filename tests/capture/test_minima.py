@@ -75,6 +75,7 @@ def false_minimum() -> tuple[CandidateLamps, Tried]:
     return CandidateLamps(FAR, np.zeros((len(made.radiance), 2))), false
 
 
+@pytest.mark.slow
 def test_a_lamp_goes_to_the_likelier_minimum_beside_it_and_stays_there() -> None:
     candidates, false = false_minimum()
     assert distance(false.lamps) > 0.5  # 0.70

@@ -52,6 +52,7 @@ def albedo_error(found: Captured) -> float:
     return float(np.sqrt((off - np.median(off)).var()))
 
 
+@pytest.mark.slow
 def test_two_lightings_are_surer_of_the_albedo_than_one() -> None:
     lit = [named(name, pictures(radiance_under([lamp]))) for name, lamp in zip(("", "2"), LAMPS, strict=True)]
     alone, both = captured(*lit[0])[0], captured(*lit[0], *lit[1])

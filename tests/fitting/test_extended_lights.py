@@ -87,6 +87,7 @@ def test_the_answer_is_printed_written_and_read(fitted_sphere, tmp_path: Path) -
     assert read.columns() == result.lights[0].columns()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mounted", [False, True], ids=["free", "mounted"])
 def test_a_panel_that_lies_in_the_ceiling_is_found(room, mounted: bool) -> None:
     truth = PanelLight([0.1, -0.2, 0.499], COLOUR, [0.0, 0.0, -1.0], 0.3, 0.15, 0.4)

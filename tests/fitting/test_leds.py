@@ -72,6 +72,7 @@ def test_deviations_are_those_of_noise(room) -> None:
     assert float(deviations[6]) < 0.05
 
 
+@pytest.mark.slow
 def test_two_leds_are_counted(room) -> None:
     rig = (led(4.0), led(4.0, HIDDEN, (-0.8, -0.3, 0.3)))
     result = fit(room, rig, LightSpec("led", None, LedLight.shaped(4.0)), noise=0.01)

@@ -79,6 +79,7 @@ def test_a_lamp_in_sight_is_left_out_and_found(ready: dict[int, FitViews], name:
     assert "lamps in sight" in result.reason
 
 
+@pytest.mark.slow
 def test_plain_targets_are_fitted_as_ever(ready: dict[int, FitViews]) -> None:
     """Wherever the light is, near walls too, and nearly all of them by one search."""
     generator, views, more = torch.Generator().manual_seed(5), ready[1], 0

@@ -16,6 +16,7 @@ from rgspipe.scene import PointLight, SpotLight
 CANDIDATES, SEPARATION, SPACING = 12, 0.3, 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lights", [1, 2, 3, 4])
 @pytest.mark.parametrize("aimed", [False, True])
 def test_the_first_that_differ_are_those_that_a_comparison_of_rigs_takes(lights, aimed):

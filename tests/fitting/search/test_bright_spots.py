@@ -39,6 +39,7 @@ def truth() -> FrozenScene:
     return room(2048, 2500)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [(0.13, 0.11), (0.31, -0.22)])
 def test_a_lamp_below_the_ceiling_is_not_put_too_low(scene: FrozenScene, truth: FrozenScene, place: tuple) -> None:
     lamp = rg.PointLight([*place, 0.45], 1.0)

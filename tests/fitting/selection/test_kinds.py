@@ -44,6 +44,7 @@ def on_pixels(room, truth: Light) -> Refiner:
     return Refiner.of(LightProblem.create(room.two.prepared, room.two.prepared.stack_images(images)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "truth",
     [

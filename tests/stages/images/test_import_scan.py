@@ -132,6 +132,7 @@ def with_depth(view: View) -> View:
     return replace(view, depth=depth)
 
 
+@pytest.mark.slow
 def test_a_capture_goes_all_the_way_to_its_lamp(tmp_path: Path) -> None:
     views = photographs(LAMPS[:1], resolution=48)
     # As a camera would expose: the brightest hundredth is clipped.

@@ -48,6 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
+@pytest.mark.slow
 def test_a_mesh_and_photographs_go_all_the_way_to_the_lamp(folder: Path) -> None:
     small = ["init.surfels=900", "lamps.count=1", "lamps.gather_rays=64", "lamps.grid=4", "lamps.supersampling=2"]
     made = pipeline.run(configured(folder, "capture_surfels", *small), load_stage)

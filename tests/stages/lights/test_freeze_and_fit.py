@@ -328,6 +328,7 @@ def test_light_may_bounce_through_the_full_operator(inputs, tmp_path):
         assert 1e-7 < error < 0.02
 
 
+@pytest.mark.slow
 def test_random_rays_of_a_target_do_not_depend_on_the_targets_before_it(inputs, tmp_path):
     options = {"effects__solver": "monte_carlo", "effects__bounces": 1, "effects__samples": 8, "fit__limit": 1}
     both = _fit(inputs, tmp_path / "both", **options).drop(columns="seconds")
