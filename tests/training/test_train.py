@@ -14,7 +14,7 @@ from rgspipe.datasets.views import View
 from rgspipe.training.checkpoint import Checkpoint
 from rgspipe.training.materials import fit_materials
 from rgspipe.training.record import Record, materials_seconds
-from rgspipe.training.trainer import train
+from rgspipe.training.trainer import Trained, train
 
 OPTIONS = LIGHT
 
@@ -36,16 +36,26 @@ def test_albedo_is_recovered_with_bounces_and_not_without(views: list[View]) -> 
     assert float(direct_error) > 0.05
 
 
-@pytest.mark.parametrize("killed_at", [3, 4, 6])
-def test_training_goes_on_from_a_checkpoint_as_if_never_interrupted(
-    views: list[View], tmp_path: Path, killed_at: int
-) -> None:
-    """Killed between two rounds, within one, and after the last step; some surfels split on the way."""
+def split_on_the_way(views: list[View], checkpoint: Checkpoint | None = None) -> Trained:
+    """A training of two rounds, in which some surfels split."""
     start = replace(painted_box(), albedo=torch.full((864, 3), 0.5))
     steps = {"steps": 6, "relight_every": 3, "growth": 1.1, "tilt_rate": 0.01, "height_rate": 0.01}
     pixels = {"views_per_step": 4, "interior_pixels": 100, "subsamples": 1}
     options = replace(OPTIONS, rounds=2, light_rounds=1, **steps, **pixels)
-    whole = train(views, start, options)
+    return train(views, start, options, checkpoint=checkpoint)
+
+
+@pytest.fixture(scope="module")
+def whole(views: list[View]) -> Trained:
+    """That training, never interrupted."""
+    return split_on_the_way(views)
+
+
+@pytest.mark.parametrize("killed_at", [3, 4, 6])
+def test_training_goes_on_from_a_checkpoint_as_if_never_interrupted(
+    views: list[View], whole: Trained, tmp_path: Path, killed_at: int
+) -> None:
+    """Killed between two rounds, within one, and after the last step."""
 
     class Killed(Exception):
         pass
@@ -57,9 +67,9 @@ def test_training_goes_on_from_a_checkpoint_as_if_never_interrupted(
                 raise Killed
 
     with pytest.raises(Killed):
-        train(views, start, options, checkpoint=KillingCheckpoint(tmp_path / "state", every=2))
-    resumed = train(views, start, options, checkpoint=Checkpoint(tmp_path / "state", every=2))
-    assert len(whole.surfels) > len(start)
+        split_on_the_way(views, KillingCheckpoint(tmp_path / "state", every=2))
+    resumed = split_on_the_way(views, Checkpoint(tmp_path / "state", every=2))
+    assert len(whole.surfels) > len(painted_box())
     for name, tensor in whole.surfels.tensors().items():
         assert torch.equal(tensor, resumed.surfels.tensors()[name]), name
     assert [record.step for record in resumed.records] == [record.step for record in whole.records]
