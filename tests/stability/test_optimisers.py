@@ -101,6 +101,7 @@ def test_levenberg_marquardt_from_a_hard_place(kept: Kept, light: str) -> None:
         assert_goes_on(one, more, 1.0 if light in DARK else 0.9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in SCENES if name not in (*INVISIBLE, *BLACK)])
 def test_both_in_a_hard_scene(kept: Kept, name: str) -> None:
     scene = SCENES[name]

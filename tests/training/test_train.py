@@ -51,6 +51,7 @@ def whole(views: list[View]) -> Trained:
     return split_on_the_way(views)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("killed_at", [3, 4, 6])
 def test_training_goes_on_from_a_checkpoint_as_if_never_interrupted(
     views: list[View], whole: Trained, tmp_path: Path, killed_at: int

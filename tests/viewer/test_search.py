@@ -41,6 +41,7 @@ def test_the_lamp_of_photographs_is_found(finder: Finder, photographs: list[Phot
     assert torch.allclose(result.lights[0].position, LAMP.position, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_how_far_each_part_of_a_search_is_is_told(
     frozen: FrozenScene, photographs: list[Photograph], monkeypatch: pytest.MonkeyPatch
 ) -> None:
