@@ -19,21 +19,21 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pandas as pd
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.ndimage import median
 from scipy.sparse.csgraph import connected_components
 from scipy.special import expit
-from scipy.stats import chi2
 
 from rgspipe.capture.field import APART, Field
 from rgspipe.capture.photographs import Numbers
 from rgspipe.capture.side_by_side import kept_property
 from rgspipe.capture.variances import FREEDOM, with_likely_variances
+from rgspipe.fitting.certainty.regions import quantile
 from rgspipe.scene.surfels import Surfels
 
 #: Median of the square of a normal number of variance 1: channels are taken to differ alike.
-MIDDLE = float(chi2.median(1))
+MIDDLE = quantile(0.5, 1)
 
 #: Rounds in which the variances of surfaces with patches of their own and the outliers on them follow.
 ROUNDS = 3
@@ -118,10 +118,11 @@ class _Islands:
         """(N,) factor of the variances of each one's surface, by the middle one of its steps: few are across a rim."""
         surfaces = self.field.graph.surfaces
         of = surfaces[self.field.graph.first][self._compared]
-        steps = pd.Series(self._steps[self._compared]).groupby(of)
-        middle, count = (part.reindex(np.arange(surfaces.max() + 1)) for part in (steps.median(), steps.size()))
-        scale = (FREEDOM + (count * middle).fillna(0.0) / MIDDLE) / (FREEDOM + count.fillna(0.0))
-        return scale.to_numpy()[surfaces]
+        count = np.bincount(of, minlength=surfaces.max() + 1)
+        middle = np.zeros(len(count))
+        some = np.flatnonzero(count)
+        middle[some] = median(self._steps[self._compared], of, some) if len(some) else 0.0
+        return ((FREEDOM + count * middle / MIDDLE) / (FREEDOM + count))[surfaces]
 
     @kept_property
     def _far(self) -> Numbers:

@@ -12,16 +12,11 @@ def imported(name: str) -> ModuleType:
     """A module, with all that it imports, while no garbage is collected.
 
     What is imported stays, and every collection would go through all of it: a sixth of the time that imports take.
-    Nor do later ones: it is frozen, after what is garbage already has been collected.
     """
-    if name in sys.modules:
-        return sys.modules[name]
-    collects = gc.isenabled()
-    gc.collect()
+    if name in sys.modules or not gc.isenabled():
+        return importlib.import_module(name)
     gc.disable()
     try:
         return importlib.import_module(name)
     finally:
-        gc.freeze()
-        if collects:
-            gc.enable()
+        gc.enable()
