@@ -10,9 +10,9 @@ print(rg.fit_lights(scene, camera, image))
 
 from __future__ import annotations
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
-from rgspipe.machine.imports import imported
 from rgspipe.machine.threads import settle_threads
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ __version__ = "0.1.0"
 def __getattr__(name: str) -> Any:
     for home, names in _HOMES.items():
         if name in names:
-            return getattr(imported(f"{__name__}.{home}"), name)
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ast
 import difflib
+import importlib
 from pathlib import Path
 
 from rgspipe.errors import InputError
-from rgspipe.machine.imports import imported
 from rgspipe.stages.base import Need, Stage, StageContext
 
 __all__ = ["NAMES", "ROOMS", "Need", "Stage", "StageContext", "load_stage", "stage_summary"]
@@ -46,7 +46,7 @@ def load_stage(name: str) -> Stage:
         near = near_stage(name)
         remedy = f"Did you mean stage={near}?" if near else "Choose one of them: stage=NAME."
         raise InputError("stage", expected=f"one of {', '.join(NAMES)}", found=repr(name), remedy=remedy)
-    return imported(f"{__name__}.{_room(name)}.{name}").STAGE
+    return importlib.import_module(f"{__name__}.{_room(name)}.{name}").STAGE
 
 
 def near_stage(word: str) -> str | None:
