@@ -101,6 +101,7 @@ class AgainstOthers:
 
     @classmethod
     def of(cls, views: Sequence[View], along_rays: bool) -> AgainstOthers:
+        """Of all views, whose depth is distances along rays if `along_rays`, as it is stated."""
         measured = _measured(views)
         if len(measured) < FEWEST_VIEWS:
             return cls(np.empty(0, int), np.empty(0), np.empty(0))
