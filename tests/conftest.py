@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 # Two test workers on two cores: more threads than one each only get in each other's way. Said before torch is imported,
 # which reads it then: in one process without workers the tests had as many threads as cores.
@@ -17,6 +18,10 @@ from tiny_dataset import change, dataset
 from warm_start import WarmStart
 
 __all__ = ["change", "dataset"]
+
+# Time is no proof: on a slow or busy processor examples take longer than Hypothesis allows them by default.
+settings.register_profile("any_processor", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any_processor")
 
 pytest_plugins = ["cpu_times"]
 

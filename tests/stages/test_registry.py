@@ -83,10 +83,9 @@ def test_packages_do_nothing_on_the_way_to_their_modules() -> None:
 LATE = ("bpy", "trimesh", "scipy.stats")
 
 
-def test_stages_load_quickly_and_collect_garbage_afterwards() -> None:
-    script = f"import gc, sys; sys.modules |= dict.fromkeys({LATE}); from rgspipe.stages import NAMES, load_stage; "
-    script += "[load_stage(name) for name in NAMES]; sys.exit(not gc.isenabled() or gc.get_freeze_count() == 0)"
-    subprocess.run([sys.executable, "-c", script], check=True)
+def test_no_stage_loads_what_few_need() -> None:
+    script = f"import sys; sys.modules |= dict.fromkeys({LATE}); from rgspipe.stages import NAMES, load_stage; "
+    subprocess.run([sys.executable, "-c", script + "[load_stage(name) for name in NAMES]"], check=True)
 
 
 def test_an_unknown_stage_is_refused_with_the_nearest_name() -> None:
