@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -108,6 +109,22 @@ def test_what_was_not_measured_along_a_rim_ties_no_patch_to_what_is_around_it() 
     assert np.sqrt((off**2).mean()) < 0.07  # 0.047
     assert len(np.unique(field.graph.surfaces[own])) == 1
     assert not np.isin(field.graph.surfaces[on_a_wall(196)[-49:]], field.graph.surfaces[own]).any()
+
+
+def test_a_channel_that_is_clipped_makes_no_patch() -> None:
+    """Its values are known from below alone, and what is around it tells them."""
+    own, true = on_a_wall(49), plain()
+    residual, told = true.copy(), np.ones((len(ROOM), 3), dtype=bool)
+    residual[own, 0] -= 1.5
+    told[own, 0] = False
+    field = Field(graph(), np.zeros(len(ROOM)), np.ones(len(ROOM)), Variances(), told=told)
+    field = with_likely_variances(field, residual, trusting=True)
+    assert with_patches(field, residual, ROOM)[0] is field
+    # Others are paint, which has that channel, too, at the rim.
+    residual[own, 1:] -= 1.5
+    told[on_a_wall(16), 0] = True
+    after, _ = with_patches(replace(field, told=told), residual, ROOM)
+    assert len(np.unique(after.graph.surfaces)) == len(np.unique(field.graph.surfaces)) + 1
 
 
 def test_a_patch_that_may_as_well_be_outliers_is_in_doubt() -> None:

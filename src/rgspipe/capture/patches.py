@@ -88,16 +88,26 @@ class _Islands:
         return replace(self.field, graph=graph, rough=rough, grain=grain, trust=self._measured.astype(np.float64))
 
     @kept_property
+    def _told(self) -> NDArray[np.bool_]:
+        """(N, 3) channels that are measured."""
+        told = np.isfinite(self.field.measured)[:, None]
+        return np.broadcast_to(told, self.residual.shape) if self.field.told is None else told & self.field.told
+
+    @kept_property
     def _measured(self) -> NDArray[np.bool_]:
         """(N,) bool."""
-        measured = np.isfinite(self.field.measured)
-        return measured if self.field.told is None else measured & self.field.told.any(axis=1)
+        return self._told.any(axis=1)
 
     @kept_property
     def _compared(self) -> NDArray[np.bool_]:
-        """(E,) neighbours that are both measured."""
+        """(E,) neighbours of which one channel is measured at both."""
         graph = self.field.graph
-        return self._measured[graph.first] & self._measured[graph.second] & (graph.weight > APART)
+        return self._told_at_both.any(axis=1) & (graph.weight > APART)
+
+    @property
+    def _told_at_both(self) -> NDArray[np.bool_]:
+        """(E, 3) channels that are measured at both of two neighbours."""
+        return self._told[self.field.graph.first] & self._told[self.field.graph.second]
 
     @kept_property
     def _variance(self) -> Numbers:
@@ -108,7 +118,7 @@ class _Islands:
     def _steps(self) -> Numbers:
         """(E,) squares of measured steps over their variance, if surfaces are alike; 0 where one is not measured."""
         graph = self.field.graph
-        squares = ((self.residual[graph.first] - self.residual[graph.second]) ** 2).mean(axis=1)
+        squares = _mean((self.residual[graph.first] - self.residual[graph.second]) ** 2, self._told_at_both)
         expected = self.field.variances.step / np.maximum(graph.weight, APART)
         expected = expected + self._variance[graph.first] + self._variance[graph.second]
         return np.divide(squares, expected, out=np.zeros_like(squares), where=self._compared)
@@ -159,7 +169,7 @@ class _Islands:
         """(N,) squares of what measurements on islands are off what all others tell of their place; 0 elsewhere."""
         island = self._even_islands > 0
         rest = self.field.trusted(np.where(island, 0.0, self.field.trust))
-        return np.where(island, ((self.residual - rest.mean_colours(self.residual)) ** 2).mean(axis=1), 0.0)
+        return np.where(island, _mean((self.residual - rest.mean_colours(self.residual)) ** 2, self._told), 0.0)
 
     @kept_property
     def _chances(self) -> Numbers:
@@ -190,3 +200,8 @@ class _Islands:
             numbers[first[reached]] = numbers[second[reached]]
             known[first[reached]] = True
         return numbers
+
+
+def _mean(squares: Numbers, told: NDArray[np.bool_]) -> Numbers:
+    """(K,) means of the channels of (K, 3) that are `told`; 0 where none is."""
+    return np.where(told, squares, 0.0).sum(axis=1) / np.maximum(told.sum(axis=1), 1)
