@@ -7,9 +7,10 @@ between neighbours of one surface:
     Q = λ Σ_(i,j) w_ij / √(h_i h_j) (e_i − e_j)(e_i − e_j)ᵀ + β Σ_i b_i b_iᵀ / h_i + diag(1 / (τ² n_i)) ,
 
 n_i the surfels of i's surface, so that the mean of a surface has the variance τ², h_i how rough that surface is beside
-the others, and b_iᵀ s what i is off the plane through its neighbours (`capture.planes`): paint that changes slowly has
-steps and hardly bends, rough paint has both. What is measured of it, r = z − m + noise with the variances v_i + σ² g_i,
-g_i the grain of the surface, then has the covariance Σ = diag(v + σ² g) + Q⁻¹, and
+the others, 1/λ twice τ² and no h where i and j are of two surfaces, which are no more alike for being even, and b_iᵀ s
+what i is off the plane through its neighbours (`capture.planes`): paint that changes slowly has steps and hardly bends,
+rough paint has both. What is measured of it, r = z − m + noise with the variances v_i + σ² g_i, g_i the grain of the
+surface, then has the covariance Σ = diag(v + σ² g) + Q⁻¹, and
 
     −2 log p(r) = rᵀ Σ⁻¹ r + log det Σ ,     Σ⁻¹ = D − D (D + Q)⁻¹ D ,    D = diag(1/(v + σ² g))
 
@@ -108,10 +109,12 @@ class Graph:
     def precision(self, variances: Variances, rough: Numbers | None = None) -> sp.csc_matrix:
         """(N, N) Q, of surfaces that are as `rough` (S,) as that; all alike if None."""
         (first, second, weight), count = self.edges, len(self.sizes)
-        weight = weight / variances.step
+        step = np.full(len(weight), variances.step)
         if rough is not None:
             own = rough[self.surfaces]
-            weight = weight / np.sqrt(own[first] * own[second])
+            step *= np.sqrt(own[first] * own[second])
+        # Two surfaces that touch differ as surfaces do, however even each of them is.
+        weight = weight / np.where(self.surfaces[first] == self.surfaces[second], step, 2.0 * variances.surface)
         diagonal = 1.0 / (variances.surface * self.sizes)
         diagonal += np.bincount(first, weight, count) + np.bincount(second, weight, count)
         every = np.arange(count)
