@@ -75,8 +75,8 @@ def test_a_patch_of_other_paint_has_its_own(size: int, jump: float) -> None:
     off = [np.sqrt(((field.mean_colours(residual) - true)[own] ** 2).mean()) for field in (before, after)]
     assert off[1] < 0.07, off  # 0.043 to 0.051, and 0.09 to 2.5 before: single measurements have 0.05 of noise
     rest = np.setdiff1d(np.arange(len(ROOM)), own)
-    assert np.sqrt(((after.mean_colours(residual) - true)[rest] ** 2).mean()) < 0.07  # 0.053
-    assert np.sqrt(doubt[own]).max() < 0.05
+    assert np.sqrt(((after.mean_colours(residual) - true)[rest] ** 2).mean()) < 0.07  # 0.055
+    assert np.sqrt(doubt[own]).max() < 0.05  # 0.0000
 
 
 @pytest.mark.parametrize("size", [1, 2, 9])
@@ -135,8 +135,8 @@ def test_a_patch_that_may_as_well_be_outliers_is_in_doubt() -> None:
         residual[own] += jump
         before = settled(residual)
         _, doubt = with_patches(before, residual, ROOM)
-        assert (doubt[np.setdiff1d(np.arange(len(ROOM)), own)] < 0.01).all()
-        assert 0.01 < np.sqrt(doubt[own]).max() < abs(jump)
+        assert (doubt[np.setdiff1d(np.arange(len(ROOM)), own)] < 0.01).all()  # 0.0000
+        assert 0.01 < np.sqrt(doubt[own]).max() < abs(jump)  # 0.21, 0.13
 
 
 @settings(max_examples=5, deadline=None)
