@@ -64,8 +64,9 @@ def test_light_of_lamps_that_stand_is_not_made_again(part: Receivers, monkeypatc
         np.testing.assert_array_equal(own, again)
 
 
-def test_candidates_are_those_of_the_scene(part: Receivers) -> None:
+@pytest.mark.parametrize("own", [False, True])
+def test_candidates_are_those_of_the_scene(part: Receivers, own: bool) -> None:
     dictionary = part.frozen.dictionary
-    places, irradiance = part.candidates()
+    places, irradiance = (part.with_dictionary(dictionary.grid, dictionary.seed) if own else part).candidates()
     np.testing.assert_array_equal(places, dictionary.positions.numpy())
     np.testing.assert_array_equal(irradiance, dictionary.irradiance.numpy()[:, part.chosen])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from half_seen_room import BACK, SIDES, TOP, only, true_room, without_back
 from rgspipe.completion.free_space import Grid
-from rgspipe.completion.hidden_room import part_of_fronts, with_hidden_room
+from rgspipe.completion.hidden_room import part_of_fronts, sees_fronts, with_hidden_room
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Surfels
 from rgspipe.scene.rectangles import rectangle, solid_box, surfels_on
@@ -45,6 +45,14 @@ def test_in_a_room_all_that_is_met_are_fronts_and_inside_a_thing_none(
         assert part > 0.85  # measured 0.93 and more: some light passes between surfels this far apart
     elif bool(inside_the_box(point, 0.05)):
         assert part < 0.3  # measured 0.19: the box stands on no surfels, and the floor's reach below it
+
+
+def test_looks_that_could_change_nothing_are_left_out(room: SurfelBvh) -> None:
+    points = torch.rand(2000, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    fronts = part_of_fronts(room, points) > 0.5
+    assert 0.05 < float((~fronts).double().mean()) < 0.95  # 0.065
+    assert torch.equal(torch.from_numpy(sees_fronts(room, points)), fronts)
+    assert sees_fronts(room, points[:0]).shape == (0,)
 
 
 def test_in_the_plane_of_a_hole_it_is_a_half() -> None:

@@ -145,7 +145,6 @@ def capture_scenes(
     weights = trace_views(surfels, views, options.supersampling if step == 1 else 1, store)
     lit = _measured(weights, views, surfels, options, where)
     frozen = FrozenScene.freeze(surfels, gather_rays=options.gather_rays, seed=options.seed)
-    frozen = frozen.with_dictionary(options.grid, seed=options.seed)
     answers = _found(frozen, list(lit.values()), _predicted(weights, views, options), options)
     return [_captured(lit[name], answer, options, name) for name, answer in zip(lit, answers, strict=True)]
 
@@ -200,7 +199,7 @@ def _found(
     every = Receivers(frozen)
     told = np.concatenate([part for measured in lit for part in _told(measured)], axis=1)
     kinds = np.unique(told, axis=0, return_inverse=True)[1].ravel()
-    part = Receivers.of(frozen, kinds, options.search_surfels)
+    part = Receivers.of(frozen, kinds, options.search_surfels).with_dictionary(options.grid, options.seed)
 
     def problems(receivers: Receivers) -> list[LampProblem]:
         own = receivers.at(predicted)

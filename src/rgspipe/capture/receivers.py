@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy.sparse as sp
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from rgspipe.capture.photographs import Numbers
 from rgspipe.renderer.clusters import cluster_patches
+from rgspipe.renderer.dictionary import LightDictionary, build_dictionary
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene.spacing import surfel_spacing
 from rgspipe.scene.surfels import Surfels
@@ -37,11 +39,13 @@ class Receivers:
         frozen: the scene; what stands in the way of light is all of it.
         stand_in: (A,) which of the N stands for each; None where they are all.
         chosen: (N,) which of the A they are, likewise.
+        dictionary: unit lights on the N, where lamps may be; the scene's if None.
     """
 
     frozen: FrozenScene
     stand_in: NDArray[np.int64] | None = None
     chosen: NDArray[np.int64] | None = None
+    dictionary: LightDictionary | None = None
 
     @classmethod
     def of(cls, frozen: FrozenScene, kinds: NDArray[np.int64], count: int) -> Receivers:
@@ -115,16 +119,26 @@ class Receivers:
 
     @cached_property
     def _irradiance(self) -> Callable[[tuple[tuple[float, ...], ...], bool], tuple[Numbers, Numbers]]:
-        at = None if self.chosen is None else torch.from_numpy(self.chosen)
-
         @lru_cache(maxsize=REMEMBERED)
         def found(places: tuple[tuple[float, ...], ...], shadows: bool) -> tuple[Numbers, Numbers]:
-            own = self.frozen.unit_irradiance(torch.tensor(places, dtype=torch.float64), shadows, at)
+            own = self.frozen.unit_irradiance(torch.tensor(places, dtype=torch.float64), shadows, self._at)
             return own[0].double().cpu().numpy(), own[1].double().cpu().numpy()
 
         return found
 
+    @property
+    def _at(self) -> Tensor | None:
+        return None if self.chosen is None else torch.from_numpy(self.chosen)
+
+    def with_dictionary(self, grid: int, seed: int) -> Receivers:
+        """With unit lights of their own, for which no shadow is looked for at other surfels; see `build_dictionary`."""
+        scene, areas = self.frozen, torch.from_numpy(self.areas)
+        made = build_dictionary(scene.bvh, areas, scene.surroundings, grid, seed=seed, at=self._at)
+        return replace(self, dictionary=made)
+
     def candidates(self) -> tuple[Numbers, Numbers]:
-        """(C, 3) places of the scene's dictionary, and (C, N) irradiance from there."""
-        dictionary = self.frozen.dictionary
-        return dictionary.positions.double().numpy(), self.at(dictionary.irradiance.double().cpu().numpy().T).T
+        """(C, 3) places of the dictionary, and (C, N) irradiance from there."""
+        own = self.dictionary
+        every = self.frozen.dictionary if own is None else own
+        irradiance = every.irradiance.double().cpu().numpy()
+        return every.positions.double().numpy(), self.at(irradiance.T).T if own is None else irradiance

@@ -85,17 +85,19 @@ def build_dictionary(
     *,
     seed: int = 0,
     shadows: bool = True,
+    at: Tensor | None = None,
 ) -> LightDictionary:
     """Candidates on a grid of the scene's bounding box, without those inside or too near to its surfaces.
 
     An open scene has candidates around it as well. All light it; see `reach`.
 
     Args:
-        bvh: N surfels.
-        areas: (N,) surface of each, scene units².
+        bvh: the surfels.
+        areas: (N,) surface of each, or of what each of those that are looked at stands for, scene units².
         grid: candidates along each axis.
         seed: of the jitter.
         shadows: whether surfels block light.
+        at: (N,) int64 surfels that are looked at; all if None.
 
     Raises:
         InputError: an impossible grid or seed; or the scene is so small in its unit of length that the images of unit
@@ -107,7 +109,7 @@ def build_dictionary(
     positions = positions[_clear_of_surfels(bvh.surfels, positions)]
     if surroundings.open:
         positions = torch.cat([positions, surroundings.shell_points()])
-    irradiance = _irradiance(bvh, positions, shadows, shown=True)
+    irradiance = _irradiance(bvh, positions, shadows, at, shown=True)
     _check_unit(irradiance, surroundings)
     flux = irradiance @ areas.to(irradiance)
     kept = Reach.of(surroundings, positions, flux).shares(positions, flux) > LEAST_FLUX
@@ -138,11 +140,13 @@ def _check_unit(irradiance: Tensor, surroundings: Surroundings) -> None:
         )
 
 
-def _irradiance(bvh: SurfelBvh, positions: Tensor, shadows: bool, shown: bool = False) -> Tensor:
-    """(C, N) of unit lights at `positions` (C, 3) on every surfel."""
+def _irradiance(
+    bvh: SurfelBvh, positions: Tensor, shadows: bool, at: Tensor | None = None, *, shown: bool = False
+) -> Tensor:
+    """(C, N) of unit lights at `positions` (C, 3) on every surfel, or those `at` (N,)."""
     batches = range(0, len(positions), BATCH)
     batches = progress_bar(batches, "light dictionary", unit="batch") if shown else batches
-    rows = [unit_irradiance(bvh, positions[start : start + BATCH], shadows)[0] for start in batches]
+    rows = [unit_irradiance(bvh, positions[start : start + BATCH], shadows, at)[0] for start in batches]
     return torch.cat(rows) if rows else torch.zeros((0, len(bvh.surfels)), device=bvh.device)
 
 
