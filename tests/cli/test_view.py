@@ -20,6 +20,7 @@ from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.view import DEMO, KEYS, PAGE_KEYS, Asked, parsed, serve, view_folder
 from rgspipe.datasets.light_file import write_lights
 from rgspipe.datasets.location import point_at_dataset
+from rgspipe.demo import TARGET
 from rgspipe.errors import InputError
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
@@ -151,12 +152,20 @@ def test_lamps_of_another_scene_are_told(
         lights = tmp_path / scene / "freeze" / "aa" / "lights.json"
         assert view_folder([str(folder), f"lights={lights}", "browser=false"]) == 0
         assert capsys.readouterr().out.count("its lights are those of the scene hall") == said
+    target = target_in(tmp_path / "hall" / "freeze" / "aa")
+    assert view_folder([str(folder), f"target={target}", "browser=false"]) == 0
+    assert "targets/evening: its cameras are those of the scene hall" in capsys.readouterr().out
     # A track has no lights.json.
     (tmp_path / "hall/freeze/aa/frames").mkdir()
     lights.rename(lights.with_name("kept"))
     write_lights(tmp_path / "hall/freeze/aa/frames/1.json", PointLight([0.0, 0.0, 0.1], 1.0), {"status": "tracked"})
     assert view_folder([str(folder), f"fit={tmp_path / 'hall/freeze/aa'}", "browser=false"]) == 0
     assert "aa/frames: its lights are those of the scene hall" in capsys.readouterr().out
+
+
+def target_in(result: Path) -> Path:
+    """The photographs that come with the package, as a target in the folder of a result."""
+    return Path(shutil.copytree(TARGET, result / "targets" / "evening"))
 
 
 class Served:

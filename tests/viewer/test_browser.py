@@ -295,13 +295,15 @@ def test_lamps_of_every_kind_are_made_with_the_fields_of_their_own_numbers(windo
 
 def test_a_luminaire_s_file_is_opened(window, page: Page) -> None:
     session, button = page.session, window.get_by_role("button", name="luminaire file")
+    window.mouse.click(20, 450)
+    window.keyboard.press("Shift+K")
+    window.get_by_text("expected a lamp that is a profile").wait_for()
     session.as_kind(0, "profile")
     page.actions.do("refresh", page.lamps.refresh).result()
     window.get_by_text("Luminaire: none").wait_for()
     for name, content in (("broken.ies", b"nothing"), ("office.ies", ies().encode())):
         with window.expect_file_chooser() as chooser:
-            button.focus()
-            window.keyboard.press("Enter")
+            window.keyboard.press("Shift+K")
         chooser.value.set_files({"name": name, "mimeType": "text/plain", "buffer": content})
         window.get_by_text("a line TILT" if name == "broken.ies" else "Luminaire: office.ies").wait_for()
     assert session.lights[0].label == "profile office.ies"

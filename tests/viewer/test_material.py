@@ -54,6 +54,13 @@ def test_a_fit_is_read_with_its_way(tmp_path: Path) -> None:
     torch.testing.assert_close(torch.from_numpy(second)[:, 2], 0.1 * torch.arange(4).double())
 
 
+@pytest.mark.parametrize("result", ["ambiguous", "converged"])
+def test_why_a_fit_is_not_sure_is_read(tmp_path: Path, result: str) -> None:
+    write_lights(tmp_path / "lights.json", RIG, {"result": result, "reason": "By two rivals.", "seconds": 1.0})
+    doubt = "The fit that found these lights is ambiguous: By two rivals."
+    assert found_in(tmp_path).doubt == (doubt if result == "ambiguous" else "")
+
+
 def test_what_a_fit_found_of_exposures_and_of_the_lamps_off_is_read(tmp_path: Path) -> None:
     told = {"exposures": [1.0, 2.0], "base_scale": {"factor": [0.5, 0.5, 0.25]}}
     told |= {"ambient": {"radiance": [0.1, 0.2, 0.3]}}

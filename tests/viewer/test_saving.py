@@ -27,6 +27,16 @@ def test_light_from_all_around_goes_along() -> None:
         assert b'"ambient"' in archive.read("lamps.json") and "all around" in archive.read("lamps.txt").decode()
 
 
+def test_what_the_fit_doubted_and_where_lamps_may_be_goes_along() -> None:
+    lamp, doubt = PointLight([0.0, 0.0, 0.5], 1.0), "The fit that found these lights is ambiguous: by two rivals."
+    zipped = exported((lamp,), World(2.0), None, (0.01 * torch.eye(6).double(),), [doubt])
+    with zipfile.ZipFile(io.BytesIO(zipped)) as archive:
+        assert doubt in archive.read("lamps.txt").decode()
+        script = archive.read("lamps_blender.py").decode()
+    with zipfile.ZipFile(io.BytesIO(exported((lamp,), World(2.0)))) as archive:
+        assert len(archive.read("lamps_blender.py").decode()) < len(script), "an ellipsoid is drawn there"
+
+
 def test_a_swing_goes_to_both_sides_and_looks_at_one_point() -> None:
     camera = Camera.look_at([0.0, -2.0, 0.3], [0.0, 0.0, 0.0], width=16, height=12)
     frames = swing(camera, torch.zeros(3, dtype=torch.float64))

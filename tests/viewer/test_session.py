@@ -223,6 +223,26 @@ def test_lamps_that_are_added_do_not_hide_each_other(session: Session) -> None:
     torch.testing.assert_close(places[0, :2], middle[:2].cpu())
 
 
+def test_what_was_found_is_told_of_its_own_lamps_alone(session: Session) -> None:
+    session.take(replace(dark_result(1.0), lights=(LAMP,)))
+    assert "is not_enough_light" in session.found_now.doubt
+    session.change([LAMP.at(LAMP.position + 0.1)])
+    assert session.found_now is None
+    session.undo()
+    assert session.found_now is session.found
+
+
+def test_lamps_of_one_target_are_not_left_in_another(session: Session) -> None:
+    own = session.lights
+    session.open(Case("morning"))
+    assert session.lights == own, "they are the visitor's"
+    session.open(Case("evening", found=Found((LAMP, LAMP), ambient=torch.ones(3))))
+    assert len(session.lights) == 2 and session.ambient is not None
+    session.open(Case("night"))
+    assert len(session.lights) == 1 and not same_lights(session.lights, own) and session.ambient is None
+    assert session.undo() and session.lights == (LAMP, LAMP), "in one step"
+
+
 def test_photographs_of_other_lamps_are_dropped(session: Session) -> None:
     camera = room_cameras(8)[0]
     session.photograph(camera)

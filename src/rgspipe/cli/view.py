@@ -64,8 +64,8 @@ def view_folder(arguments: Sequence[str]) -> int:
     from rgspipe.renderer.frozen import FrozenScene
     from rgspipe.renderer.frozen_file import SURFELS
     from rgspipe.stages.lights.capture import found_capture
-    from rgspipe.stages.scene.export import world_of
-    from rgspipe.stages.scene.light_origin import elsewhere_line, origin_of
+    from rgspipe.stages.scene.export import NO_WATTS, world_of
+    from rgspipe.stages.scene.light_origin import elsewhere_line, is_captured, origin_of
     from rgspipe.stages.sources import check_target
     from rgspipe.viewer.material import Case, case_in
     from rgspipe.viewer.serve import view
@@ -75,15 +75,17 @@ def view_folder(arguments: Sequence[str]) -> int:
     if asked.target is not None:
         check_target(asked.target)
     found = None if asked.fit is None else found_or_followed(asked.fit)
-    given = [] if asked.lights is None else [Path(asked.lights)]
-    given += [] if asked.fit is None else [shown_in(asked.fit)]
-    for line in filter(None, (elsewhere_line(file, Path(asked.folder) / SURFELS) for file in given)):
+    surfels = Path(asked.folder) / SURFELS
+    given = [] if asked.lights is None else [(Path(asked.lights), "lights")]
+    given += [] if asked.fit is None else [(shown_in(asked.fit), "lights")]
+    given += [] if asked.target is None else [(Path(asked.target), "cameras")]
+    for line in filter(None, (elsewhere_line(file, surfels, what) for file, what in given)):
         print(line)
     unknowns = {} if found is None else found.unknowns
     if asked.lights is not None and (ambient := read_ambient(asked.lights)) is not None:
         unknowns["ambient"] = ambient
     case = Case(found=found) if asked.target is None else case_in(asked.target, found, found_capture)
-    info = origin_of(asked.folder / SURFELS)
+    info = origin_of(surfels)
     viewer = view(
         FrozenScene.load(asked.folder).to(device),
         None if asked.lights is None else read_lights(asked.lights),
@@ -93,6 +95,7 @@ def view_folder(arguments: Sequence[str]) -> int:
         resolution=asked.resolution,
         address=asked.address,
         world=world_of(1.0, info),
+        notes=[NO_WATTS] if is_captured(surfels) else [],
         **unknowns,
     )
     return serve(viewer, asked.port, asked.browser)

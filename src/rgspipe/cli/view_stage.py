@@ -67,7 +67,7 @@ def _serve(made: _Made) -> int:
     from rgspipe.datasets.info import INFO
     from rgspipe.renderer.device import chosen_device
     from rgspipe.renderer.frozen import FrozenScene
-    from rgspipe.stages.scene.export import world_of
+    from rgspipe.stages.scene.export import NO_WATTS, world_of
     from rgspipe.viewer.serve import view
 
     config, freeze = made.config("freeze"), made.find("freeze")
@@ -83,6 +83,7 @@ def _serve(made: _Made) -> int:
         resolution=page.resolution,
         address=page.address,
         world=world,
+        notes=[NO_WATTS] if config.scene.lamps == "unknown" else [],
         exposure_free=config.fit.exposure == "free",
         base_scale_free=config.fit.base_scale == "free",
         ambient=config.light.ambient,

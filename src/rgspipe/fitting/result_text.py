@@ -44,6 +44,11 @@ def ending(status: FitStatus, duration: str) -> str:
     return f"{ENDS.get(status, status.replace('_', ' '))} {after} {duration}"
 
 
+def doubt(status: str, reason: str) -> str:
+    """What goes with lights to where their fit is not known: why it is not sure of them; empty where it is."""
+    return "" if status == FitStatus.CONVERGED else f"The fit that found these lights is {status}: {reason}"
+
+
 def light_lines(lights: LightRig, covariance: Sequence[Tensor]) -> list[str]:
     """`light_line` of each light; `covariance` may be empty."""
     spreads = dict(enumerate(covariance))

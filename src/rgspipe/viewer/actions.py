@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import viser
+from viser._messages import RunJavascriptMessage
 
 from rgspipe.errors import InputError
 
@@ -80,6 +81,15 @@ class Actions:
             self.do(button.label, lambda: take(file))
 
         button.on_upload(opened)
+
+    def press(self, button: viser.GuiUploadButtonHandle) -> None:
+        """Have the browser press a button that asks for a file.
+
+        Browsers let a page ask within seconds of a key, but a program only through what it runs in the page, to which
+        viser 1.1.1 has no door of its own.
+        """
+        script = f'document.getElementById("{button._impl.uuid}")?.click()'
+        self._client.gui._websock_interface.queue_message(RunJavascriptMessage(source=script))
 
     def do(self, name: str, run: Callable[[], None]) -> Future:
         """Do something after all that was asked for before; what cannot be done is told in a note."""

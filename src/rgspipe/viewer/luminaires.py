@@ -6,12 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rgspipe.datasets.photometric_file import READERS, photometry_of
+from rgspipe.errors import InputError
 from rgspipe.scene.lights import Light, Photometry
-from rgspipe.viewer.actions import BESIDE
+from rgspipe.viewer.actions import BESIDE, Action
 from rgspipe.viewer.lamp_kinds import words
 from rgspipe.viewer.visit import Visit
 
-_HINT = "A measured luminaire, of an IES or EULUMDAT file. Browsers ask for files on a click, or on Tab and Enter."
+_HELP = "A measured luminaire, of an IES or EULUMDAT file."
+_KEY = "shift+K"
+_HINT = f"{_HELP} Key Shift-K."
 
 
 class Luminaires:
@@ -30,6 +33,8 @@ class Luminaires:
         with self._folder:
             gui.add_markdown(_HINT)
             button = gui.add_upload_button("luminaire file", hint=_HINT, color=BESIDE, mime_type=",".join(READERS))
+        self._press = lambda: visit.actions.press(button)
+        visit.actions.keys(Action(button.label, _KEY, _HELP, self._ask))
         visit.actions.file(button, lambda file: take(photometry_of(file.content, Path(file.name))))
 
     def show(self, light: Light | None) -> None:
@@ -37,3 +42,9 @@ class Luminaires:
         told = "" if light is None else words(light, self._images)
         self._told.content, self._told.visible = told, bool(told)
         self._folder.visible = light is not None and light.tabulated
+
+    def _ask(self) -> None:
+        if not self._folder.visible:
+            remedy = "Make it one first: key K."
+            raise InputError("luminaire file", expected="a lamp that is a profile", found="another", remedy=remedy)
+        self._press()

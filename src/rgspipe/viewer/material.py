@@ -21,7 +21,7 @@ from rgspipe.errors import InputError
 from rgspipe.fitting import FitResult
 from rgspipe.fitting.findings import FitStatus
 from rgspipe.fitting.model.capture import SATURATED, ImageCapture
-from rgspipe.fitting.result_text import as_text, headline, light_lines
+from rgspipe.fitting.result_text import as_text, doubt, headline, light_lines
 from rgspipe.fitting.words import told_alternative
 from rgspipe.scene import Camera, LightRig
 
@@ -85,6 +85,7 @@ class Found:
         base_scale: (3,) how many times images with the lamps off are in the photographs; once if None.
         ambient: (3,) radiance that comes from all around through openings; black if None.
         frames: what each frame of lamps that move is called, and how it was found; empty where they stand.
+        doubt: what goes with them to where the fit is not known; empty where it is sure of them.
     """
 
     lights: LightRig
@@ -97,6 +98,7 @@ class Found:
     base_scale: Tensor | None = None
     ambient: Tensor | None = None
     frames: tuple[str, ...] = ()
+    doubt: str = ""
 
     @property
     def step(self) -> int:
@@ -119,9 +121,17 @@ class Found:
         steps = tuple(step.lights for step in result.trajectory)
         others = (ToldAlternative(one.lights, told_alternative(one), one.ruled_out) for one in result.alternatives)
         scale, ambient = (None if one is None else one.value for one in (result.base_scale, result.ambient))
-        told, exposures = repr(result), result.exposures
         return cls(
-            result.lights, result.covariance, told, result.costs, steps, tuple(others), exposures, scale, ambient
+            result.lights,
+            result.covariance,
+            repr(result),
+            result.costs,
+            steps,
+            tuple(others),
+            result.exposures,
+            scale,
+            ambient,
+            doubt=doubt(result.status, result.reason),
         )
 
 
@@ -192,12 +202,13 @@ def found_in(fit: str | Path) -> Found:
     lights, told = read_lights(path), read_json(path, "a fit's light file")
     costs = {int(count): float(cost) for count, cost in told.get("costs", {}).items()}
     covariances = read_covariances(path)
-    words = _words(told, lights, covariances) if {"result", "reason", "seconds"} <= told.keys() else ""
+    is_fit = {"result", "reason", "seconds"} <= told.keys()
+    words, unsure = (_words(told, lights, covariances), doubt(told["result"], told["reason"])) if is_fit else ("", "")
     steps = _path(Path(fit) / "convergence.csv", lights)
     exposures = tuple(float(one) for one in told.get("exposures", ()))
     scale = torch.tensor(told["base_scale"]["factor"]).double() if "base_scale" in told else None
     others, ambient = read_alternatives(path), read_ambient(path)
-    return Found(lights, covariances, words, costs, steps, others, exposures, scale, ambient)
+    return Found(lights, covariances, words, costs, steps, others, exposures, scale, ambient, doubt=unsure)
 
 
 def _words(told: Mapping[str, Any], lights: LightRig, covariances: Sequence[Tensor]) -> str:

@@ -6,6 +6,7 @@ import io
 import math
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -45,7 +46,10 @@ class Saving:
 
     def _export(self) -> None:
         session = self._session
-        self._send("lamps.zip", exported(session.lights, self._visit.exhibit.world, session.ambient))
+        exhibit, found = self._visit.exhibit, session.found_now
+        regions, doubt = ((), "") if found is None else (found.covariance, found.doubt)
+        notes = [*filter(None, [doubt]), *exhibit.notes]
+        self._send("lamps.zip", exported(session.lights, exhibit.world, session.ambient, regions, notes))
 
     def _still(self) -> None:
         if (camera := self._visit.camera()) is not None:
@@ -79,11 +83,17 @@ class Saving:
         self._visit.client.send_file_download(name, content, save_immediately=True)
 
 
-def exported(lights: LightRig, world: World, ambient: Tensor | None = None) -> bytes:
-    """A zip file of lamps in the formats of other programs, and of the radiance (3,) that came from all around."""
+def exported(
+    lights: LightRig,
+    world: World,
+    ambient: Tensor | None = None,
+    covariances: Sequence[Tensor] = (),
+    notes: Sequence[str] = (),
+) -> bytes:
+    """A zip file of lamps in the formats of other programs, with what `export_lights` takes beside them."""
     buffer = io.BytesIO()
     with tempfile.TemporaryDirectory() as folder, zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        export_lights(lights, folder, world=world, ambient=ambient)
+        export_lights(lights, folder, world=world, ambient=ambient, covariances=covariances, notes=notes)
         for path in sorted(Path(folder).iterdir()):
             archive.write(path, path.name)
     return buffer.getvalue()

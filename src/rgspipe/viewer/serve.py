@@ -179,6 +179,7 @@ def view(
     exposure_free: bool = False,
     base_scale_free: bool = False,
     ambient: ArrayLike | None = False,
+    notes: Sequence[str] = (),
 ) -> Viewer:
     """Show a scene in the browser, at 127.0.0.1 only; returns at once.
 
@@ -207,6 +208,7 @@ def view(
         base_scale_free: whether images with the lamps off are in photographs an unknown number of times.
         ambient: whether searches allow for light from all around through openings besides; they do where (3,) radiance
             of it is given, as `read_ambient` has it, which pictures then begin with.
+        notes: of the scene, that go with lamps which are exported.
 
     Raises:
         InputError: viser is not installed, or an argument is not what it should be.
@@ -242,7 +244,8 @@ def view(
         around is not None or ambient is True or unknowns["ambient"],
         emitters is not None,
     )
-    exhibit = Exhibit(LampImages(scene), finder, camera, rig, around, every, known, resolution, world or World())
+    shown = LampImages(scene), finder, camera, rig, around, every, known, resolution, world or World(), tuple(notes)
+    exhibit = Exhibit(*shown)
     viewer = Viewer(exhibit, 0 if is_open else port)
     if is_open:
         try:

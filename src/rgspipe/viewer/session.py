@@ -100,19 +100,20 @@ class Session:
 
     def add(self, kind: str = "point") -> int:
         """A lamp above the middle of the scene, or beside those that are there, as bright as the mean; its index."""
+        self.change([*self.lights, self._further(kind, self.lights)])
+        return len(self.lights) - 1
+
+    def _further(self, kind: str, others: LightRig) -> Light:
         lower, upper = (corner.double().cpu() for corner in self.images.frozen.bounds)
         middle = 0.5 * (lower + upper)
         above = torch.stack([middle[0], middle[1], middle[2] + 0.25 * (upper[2] - lower[2])])
         size = max(self.images.frozen.size, 1e-6)
-        position = next(place for place in _around(above, GAP * size) if self._is_free(place, 0.5 * GAP * size))
-        level = [irradiance(light, size) * float(light.intensity.mean()) for light in self.lights] or [2.0]
+        taken = [light.position for light in others]
+        position = next(one for one in _around(above, GAP * size) if _is_free(one, taken, 0.5 * GAP * size))
+        level = [irradiance(light, size) * float(light.intensity.mean()) for light in others] or [2.0]
         lamp = made(kind, size)
         intensity = torch.full((3,), sum(level) / len(level) / irradiance(lamp, size), dtype=torch.float64)
-        self.change([*self.lights, lamp.at(position, DOWN, intensity)])
-        return len(self.lights) - 1
-
-    def _is_free(self, place: Tensor, distance: float) -> bool:
-        return all(float((light.position - place).norm()) > distance for light in self.lights)
+        return lamp.at(position, DOWN, intensity)
 
     def remove(self, index: int) -> None:
         """Take a lamp away."""
@@ -192,14 +193,26 @@ class Session:
         pairs = zip(self.case.photographs, exposures, strict=False)
         return next((exposure for taken, exposure in pairs if taken is photograph), 1.0)
 
+    @property
+    def found_now(self) -> Found | None:
+        """What a search found, as far as the lamps of now are those; None where they are others."""
+        return self.found if self.found is not None and same_lights(self.found.lights, self.lights) else None
+
     def open(self, case: Case) -> None:
-        """Look at other photographs, and at what a fit found in them."""
+        """Look at other photographs, and at what a fit found in them.
+
+        What was found in those before is nothing to compare these with: a lamp above the middle takes its place.
+        """
+        former = self.found
         self.case, self.found = case, case.found
         if case.photographs:
             self._gain = display_gain(case.photographs[0].image)
         if case.found is not None:
             self.ambient = case.found.ambient
             self.change(case.found.lights)
+        elif former is not None:
+            self.ambient = None
+            self.change([self._further("point", ())])
 
     def take(self, result: FitResult, searched: bool = True) -> None:
         """Make what was found the lamps.
@@ -238,6 +251,10 @@ def alike(one: LightRig, other: LightRig, size: float) -> bool:
 
 def _fields(light: Light) -> tuple:
     return light.kind, light.position.tolist(), light.intensity.tolist(), light.file_fields()
+
+
+def _is_free(place: Tensor, taken: Sequence[Tensor], distance: float) -> bool:
+    return all(float((other - place).norm()) > distance for other in taken)
 
 
 def _around(middle: Tensor, gap: float) -> Iterator[Tensor]:

@@ -36,6 +36,7 @@ class Exhibit:
         references: photographs under lamps that are known.
         resolution: pixels along the longer side of pictures at rest.
         world: how scene units came about, for lamps that are exported.
+        notes: of the scene, for those as well.
         turn: is held while images are made, as several visitors share the processor and what is kept of images.
     """
 
@@ -48,6 +49,7 @@ class Exhibit:
     references: Sequence[Photograph] = ()
     resolution: int = 256
     world: World = field(default_factory=World)
+    notes: Sequence[str] = ()
     turn: threading.Lock = field(default_factory=threading.Lock)
 
     def session(self) -> Session:

@@ -13,7 +13,7 @@ from rgspipe.datasets.light_file import read_ambient, read_lights
 from rgspipe.datasets.ply.file import save_ply
 from rgspipe.datasets.surfel_file import load_surfels
 from rgspipe.errors import InputError
-from rgspipe.fitting.findings import FitStatus
+from rgspipe.fitting.result_text import doubt
 from rgspipe.light_export.export import export_lights
 from rgspipe.light_export.world import World
 from rgspipe.renderer.ambient import ambient_radiance
@@ -74,9 +74,8 @@ def _doubts(path: Path) -> list[str]:
     """What the fit said of lights that it is not sure of, and of units that nothing ties down."""
     told = read_json(path, "a light file")
     status, reason = told.get("result"), told.get("reason", "")
-    unsure = isinstance(status, str) and status not in (FitStatus.CONVERGED, "")
-    said = [f"The fit that found these lights is {status}: {reason}"] if unsure else []
-    return [*said, NO_WATTS] if is_captured(path) else said
+    said = doubt(status, reason) if isinstance(status, str) and status else ""
+    return [*filter(None, [said]), *([NO_WATTS] if is_captured(path) else [])]
 
 
 def world_of(metres: float, info: Path | None) -> World:

@@ -42,17 +42,17 @@ def scene_of(file: Path) -> str | None:
     return next((folder.parent.parent.name for folder in _results(file)), None)
 
 
-def elsewhere_line(lights: Path, scene: Path) -> str:
-    """A line where a light file belongs to another scene than the file `scene`; empty where it does not.
+def elsewhere_line(file: Path, scene: Path, what: str = "lights") -> str:
+    """A line where a file of lights, or of `what`, belongs to another scene than the file `scene`; else empty.
 
     Raises:
         InputError: a manifest on the way is damaged.
     """
-    own, here = scene_of(lights), scene_of(scene)
+    own, here = scene_of(file), scene_of(scene)
     if own is None or here is None or own == here:
         return ""
     return (
-        f"{lights}: its lights are those of the scene {own}; here they stand at the same coordinates of {here}, "
+        f"{file}: its {what} are those of the scene {own}; here they stand at the same coordinates of {here}, "
         "which is the same place only where both were made from one file."
     )
 
