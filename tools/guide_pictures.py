@@ -65,6 +65,10 @@ DOING = {
 STAMP = re.compile(r"^submitit INFO \(([^)]+)\)", re.MULTILINE)
 MADE = re.compile(r"^(\w+): made( by another process)? in ([\d.]+) s", re.MULTILINE)
 
+#: A row of the laboratory's table of times, CPU before GPU, and its units.
+TIMED = re.compile(r"^\| (.+?) \| ([\d.]+) (m?s) \| ([\d.]+) (m?s) \| ([\d.]+) times \|$", re.MULTILINE)
+SECONDS = {"s": 1.0, "ms": 1e-3}
+
 #: The stage that the guide adds: the first block of Python on its page.
 ADDED = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -312,6 +316,25 @@ def _parts(job: Path) -> list[tuple[str, float]]:
     return [("waits for a core", began - script.stat().st_mtime), ("starts", starts), *stages]
 
 
+def gpu(_: FrozenScene) -> Bytes:
+    """What the laboratory measured on a GPU, and on the processor beside it."""
+    rows = TIMED.findall((ROOT / "docs" / "laboratory" / "gpu.md").read_text())
+    figure = Figure(figsize=(8.4, 2.8), dpi=100, layout="constrained")
+    axes = figure.add_subplot(xscale="log", xlabel="seconds")
+    axes.set_yticks(range(len(rows)), [what for what, *_ in rows], fontsize=9)
+    for row, (_, slow, slow_unit, fast, fast_unit, ratio) in enumerate(rows):
+        ends = float(fast) * SECONDS[fast_unit], float(slow) * SECONDS[slow_unit]
+        axes.plot(ends, (row, row), color=DOING["waits for a core"], linewidth=11, solid_capstyle="butt", zorder=0)
+        axes.annotate(f"{ratio} times", (math.sqrt(math.prod(ends)), row), ha="center", va="center", fontsize=8)
+        for end, of in zip(ends, ("fits", "freezes the scene"), strict=True):
+            axes.plot(end, row, "o", color=DOING[of])
+    axes.margins(y=0.12)
+    axes.invert_yaxis()
+    handles = [Patch(color=DOING[of], label=what) for what, of in (("GPU", "fits"), ("CPU", "freezes the scene"))]
+    figure.legend(handles=handles, ncols=2, loc="outside upper center", fontsize=9, frameon=False)
+    return drawn(figure)
+
+
 def drawn(figure: Figure) -> Bytes:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
@@ -435,6 +458,7 @@ PICTURES: dict[str, Callable[[FrozenScene], Bytes]] = {
     "exponents": exponents,
     "regions": regions,
     "exported": exported,
+    "gpu": gpu,
     "photographs": photographs,
     "ply": ply,
     "scan": scan,
@@ -446,7 +470,7 @@ PICTURES: dict[str, Callable[[FrozenScene], Bytes]] = {
 }
 
 #: Of lines and letters, which are kept as they are.
-DRAWN = ("cluster", "photographs", "regions", "settings", "stages", "sweep")
+DRAWN = ("cluster", "gpu", "photographs", "regions", "settings", "stages", "sweep")
 
 
 if __name__ == "__main__":
