@@ -55,6 +55,10 @@ def test_pages_of_other_sites_may_not(viewer: Viewer, origin: str) -> None:
     assert answer(viewer.url, origin) == 403
 
 
+def test_consoles_and_notebooks_show_where_the_page_is(viewer: Viewer) -> None:
+    assert viewer.url in repr(viewer) and f'href="{viewer.url}"' in viewer._repr_html_()
+
+
 def test_where_nobody_can_listen_the_server_behind_is_stopped(
     frozen: FrozenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:

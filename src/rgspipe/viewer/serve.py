@@ -72,6 +72,13 @@ class Viewer:
         self._server.on_client_disconnect(self._bye)
         self.url = f"http://{LOOPBACK}:{self._server.get_port()}"
 
+    def __repr__(self) -> str:
+        return f"Viewer at {self.url}; its stop() ends it"
+
+    def _repr_html_(self) -> str:
+        """As notebooks show it: a link."""
+        return f'Viewer at <a href="{self.url}" target="_blank">{self.url}</a>; its stop() ends it'
+
     def open_to(self, address: str, port: int) -> None:
         """Let others look, at another address of this machine, with a token that `url` then has.
 
