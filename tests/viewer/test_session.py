@@ -21,7 +21,7 @@ from rgspipe.scene import PointLight
 from rgspipe.scene.lights import KINDS, SunLight
 from rgspipe.scene.surfels import Gloss
 from rgspipe.viewer.lamp_images import LampImages
-from rgspipe.viewer.material import Case, Found, Photograph
+from rgspipe.viewer.material import Case, Found, Photograph, found_in
 from rgspipe.viewer.session import ILLUMINANCE, IRRADIANCE, Session, same_lights
 
 LAMP = PointLight(list(VISIBLE), [0.6, 0.5, 0.4])
@@ -230,6 +230,17 @@ def test_what_was_found_is_told_of_its_own_lamps_alone(session: Session) -> None
     assert session.found_now is None
     session.undo()
     assert session.found_now is session.found
+
+
+def test_saved_lamps_have_what_the_fit_says_of_them(session: Session, tmp_path: Path) -> None:
+    spread = (0.01 * torch.eye(6).double(),)
+    session.take(replace(dark_result(1.0), lights=(LAMP,), covariance=spread))
+    session.save(tmp_path / "lights.json")
+    found = found_in(tmp_path)
+    assert found.doubt == session.found.doubt and torch.equal(found.covariance[0], spread[0])
+    session.change([LAMP.at(LAMP.position + 0.1)])
+    session.save(tmp_path / "lights.json")
+    assert found_in(tmp_path).doubt == "" and found_in(tmp_path).covariance == ()
 
 
 def test_lamps_of_one_target_are_not_left_in_another(session: Session) -> None:

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from rgspipe.datasets.alternatives_file import ToldAlternative, read_alternatives
-from rgspipe.datasets.covariance_file import read_covariances
+from rgspipe.datasets.covariance_file import covariance_fields, read_covariances
 from rgspipe.datasets.gs3 import load_target
 from rgspipe.datasets.json_file import read_json
 from rgspipe.datasets.light_file import read_ambient, read_lights
@@ -85,7 +85,7 @@ class Found:
         base_scale: (3,) how many times images with the lamps off are in the photographs; once if None.
         ambient: (3,) radiance that comes from all around through openings; black if None.
         frames: what each frame of lamps that move is called, and how it was found; empty where they stand.
-        doubt: what goes with them to where the fit is not known; empty where it is sure of them.
+        status, reason: how the fit ended, and why; empty where nothing is known of it.
     """
 
     lights: LightRig
@@ -98,7 +98,19 @@ class Found:
     base_scale: Tensor | None = None
     ambient: Tensor | None = None
     frames: tuple[str, ...] = ()
-    doubt: str = ""
+    status: str = ""
+    reason: str = ""
+
+    @property
+    def doubt(self) -> str:
+        """What goes with the lamps to where the fit is not known; empty where it is sure of them."""
+        return doubt(self.status, self.reason) if self.status else ""
+
+    @property
+    def fields(self) -> dict[str, Any]:
+        """What a light file holds of them besides, as that of a fit does."""
+        fields = {"lights": covariance_fields(len(self.lights), {"covariance": self.covariance})}
+        return fields | ({"result": self.status, "reason": self.reason} if self.status else {})
 
     @property
     def step(self) -> int:
@@ -131,7 +143,8 @@ class Found:
             result.exposures,
             scale,
             ambient,
-            doubt=doubt(result.status, result.reason),
+            status=str(result.status),
+            reason=result.reason,
         )
 
 
@@ -202,13 +215,13 @@ def found_in(fit: str | Path) -> Found:
     lights, told = read_lights(path), read_json(path, "a fit's light file")
     costs = {int(count): float(cost) for count, cost in told.get("costs", {}).items()}
     covariances = read_covariances(path)
-    is_fit = {"result", "reason", "seconds"} <= told.keys()
-    words, unsure = (_words(told, lights, covariances), doubt(told["result"], told["reason"])) if is_fit else ("", "")
+    words = _words(told, lights, covariances) if {"result", "reason", "seconds"} <= told.keys() else ""
     steps = _path(Path(fit) / "convergence.csv", lights)
     exposures = tuple(float(one) for one in told.get("exposures", ()))
     scale = torch.tensor(told["base_scale"]["factor"]).double() if "base_scale" in told else None
     others, ambient = read_alternatives(path), read_ambient(path)
-    return Found(lights, covariances, words, costs, steps, others, exposures, scale, ambient, doubt=unsure)
+    ended = {"status": str(told.get("result", "")), "reason": str(told.get("reason", ""))}
+    return Found(lights, covariances, words, costs, steps, others, exposures, scale, ambient, **ended)
 
 
 def _words(told: Mapping[str, Any], lights: LightRig, covariances: Sequence[Tensor]) -> str:

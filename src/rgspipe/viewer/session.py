@@ -228,8 +228,9 @@ class Session:
         self.change(result.lights)
 
     def save(self, path: str | Path) -> None:
-        """Write a light file."""
-        write_lights(path, self.lights, ambient_fields(self.ambient))
+        """Write a light file, with what the fit says of its lamps where they are those of now."""
+        found = self.found_now
+        write_lights(path, self.lights, ambient_fields(self.ambient) | ({} if found is None else found.fields))
 
     def save_still(self, path: str | Path, camera: Camera) -> None:
         """Write the sharp picture as PNG."""
