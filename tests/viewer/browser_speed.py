@@ -1,15 +1,19 @@
 """How often and how soon a browser shows a lamp that is dragged: `python tests/viewer/browser_speed.py [FOLDER]`.
 
-Chromium draws without a GPU, on the same processor that makes the pictures. Without the folder of a frozen scene it is
+Chromium draws without a GPU, on the same processor that makes the pictures; whose time a picture takes is told of
+Linux. Without the folder of a frozen scene it is
 a Cornell box of 10000 surfels on its true surfaces.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
 import statistics
 import sys
 import time
+from pathlib import Path
 
 import torch
 from chromium import grip, launched, on_canvas
@@ -95,7 +99,7 @@ def _held(window, page: Page, lamp: rg.PointLight) -> tuple[float, float]:
 def _dragged(window, start: tuple[float, float]) -> None:
     x, y = start
     window.evaluate("window.moved = []; window.drawn = []")
-    began = time.monotonic()
+    own, others, began = time.process_time(), _of_children(), time.monotonic()
     while (gone := time.monotonic() - began) < DRAGGED:
         window.mouse.move(x + FAR * math.sin(gone), y)
         time.sleep(max(0.0, began + gone + 1.0 / HERTZ - time.monotonic()))
@@ -103,6 +107,22 @@ def _dragged(window, start: tuple[float, float]) -> None:
     seconds = 1e-3 * (moved[-1] - moved[0])
     rate = sum(when <= moved[-1] for when in drawn) / seconds
     print(f"{rate:.1f} pictures a second for {len(moved) / seconds:.0f} moves of the mouse, ", end="", flush=True)
+    parts = [1e3 * spent / len(drawn) for spent in (time.process_time() - own, _of_children() - others)]
+    print("of a picture's processor time {:.0f} ms here and {:.0f} in the browser, ".format(*parts), end="", flush=True)
+
+
+def _of_children() -> float:
+    """Seconds of the processor that the processes which this one started have taken, and those that these did."""
+    spent, parents = {}, {}
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            told = place.read_text().rpartition(")")[2].split()
+            parents[int(place.parent.name)] = int(told[1])
+            spent[int(place.parent.name)] = (int(told[11]) + int(told[12])) / os.sysconf("SC_CLK_TCK")
+    mine = {os.getpid()}
+    while further := {one for one, parent in parents.items() if parent in mine} - mine:
+        mine |= further
+    return sum(spent[one] for one in mine - {os.getpid()})
 
 
 def _moved_once(window, start: tuple[float, float]) -> None:
