@@ -25,6 +25,7 @@ from rgspipe.errors import InputError
 from rgspipe.light_export.world import World
 from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import PointLight
+from rgspipe.stages.scene.export import NO_WATTS
 from rgspipe.viewer.serve import view
 from rooms import closed_box
 
@@ -105,7 +106,14 @@ def test_lamps_are_exported_to_where_they_are_in_the_scene_s_own_file(
     monkeypatch.setattr(FrozenScene, "load", lambda folder: scene)
     monkeypatch.setattr("rgspipe.viewer.serve.view", lambda *_, **words: given.update(words) or Served())
     assert view_folder([str(folder), "browser=false"]) == 0
-    assert given["world"] == World(1.0, 0.25, (1.0, 2.0, -3.0))
+    assert given["world"] == World(1.0, 0.25, (1.0, 2.0, -3.0)) and given["notes"] == []
+    (tmp_path / "room" / "generate_dataset").rename(tmp_path / "room" / "capture_surfels")
+    told = {"schema": 1, "stage": "capture_surfels", "fingerprint": "aa", "inputs": {}, "files": {}, "facts": {}}
+    (tmp_path / "room" / "capture_surfels" / "aa" / "manifest.json").write_text(json.dumps(told))
+    told |= {"stage": "freeze", "inputs": {"capture_surfels": ["aa"]}}
+    (folder / "manifest.json").write_text(json.dumps(told))
+    assert view_folder([str(folder), "browser=false"]) == 0
+    assert given["notes"] == [NO_WATTS]
 
 
 def frozen_from(dataset: Path, outputs: Path) -> Path:

@@ -52,6 +52,9 @@ LAMP = PointLight(list(VISIBLE), 0.5)
 #: A camera that has the lamp in its middle.
 CAMERA = Camera.look_at([-0.45, -0.45, 0.0], [0.1, -0.15, 0.25], fov_degrees=70, width=64, height=64)
 
+#: Of the scene, for lamps that are exported.
+NOTE = "Nobody measured these lamps."
+
 #: How long a step may take on a busy machine, s.
 PATIENCE = 300.0
 
@@ -67,7 +70,7 @@ def viewer(freeze: Artifact) -> Iterator[Viewer]:
     frozen = FrozenScene.load(freeze.folder())
     # It has the name that the visitor's own photograph is going to have, and is offered no more then.
     reference = Photograph("photograph 0", CAMERA, frozen.render(CAMERA, LAMP))
-    made = view(frozen, LAMP, camera=CAMERA, references=[reference], port=8190, resolution=64)
+    made = view(frozen, LAMP, camera=CAMERA, references=[reference], port=8190, resolution=64, notes=[NOTE])
     yield made
     made.stop()
 
@@ -334,6 +337,7 @@ def test_lamps_are_taken_home(window, page: Page) -> None:
         window.keyboard.press("h")
     with zipfile.ZipFile(download.value.path()) as archive:
         assert {"lamps_blender.py", "lamps.usda", "lamps.gltf", "lamps.json", "lamps.txt"} <= {*archive.namelist()}
+        assert NOTE in archive.read("lamps.txt").decode()
 
 
 def test_the_picture_and_a_video_through_the_section_are_taken_home(window, page: Page) -> None:

@@ -94,7 +94,7 @@ class FitControls:
             self._step.value = found.step
             self._step.label = "frame" if found.frames else "step"
         self._find.visible = bool(case.photographs)
-        self._told.content = _told(case, found, int(self._step.value))
+        self._told.content = told(case, found, int(self._step.value))
 
     def find(self) -> None:
         """Search the lamps of the photographs, and show them with their regions."""
@@ -250,19 +250,20 @@ class FitControls:
         found = self._session.found
         if found is not None:
             self._session.change(found.path[int(self._step.value)], "step")
-            self._told.content = _told(self._session.case, found, int(self._step.value))
+            self._told.content = told(self._session.case, found, int(self._step.value))
             self._lamps_changed()
             self._visit.changed()
 
 
-def _told(case: Case, found: Found | None, step: int) -> str:
+def told(case: Case, found: Found | None, step: int) -> str:
     """What was found, or how many photographs there are to find lamps in, or why there are none."""
     words = "" if found is None else _words(found, step)
     if not case.photographs:
         why = f"{case.lacking} Take one of this view: “{_TAKE}” under “photographs”, or key **P**."
         return why if found is None else f"{words}\n\n{why}"
     count = len(case.photographs)
-    return words or f"{count} photograph{'s' * (count != 1)}."
+    words = words or f"{count} photograph{'s' * (count != 1)}."
+    return f"{words}\n\n{case.warning}" if case.warning else words
 
 
 def _words(found: Found, step: int) -> str:

@@ -155,6 +155,7 @@ class Case:
     Attributes:
         lacking: why there are no photographs, in a sentence.
         others: further photographs under the same lamps, which are looked at and not searched.
+        warning: what is wrong with the photographs, in a sentence; empty where nothing is known to be.
     """
 
     name: str = "none"
@@ -163,6 +164,7 @@ class Case:
     found: Found | None = None
     lacking: str = "There are no photographs to find lamps in."
     others: Sequence[Photograph] = ()
+    warning: str = ""
 
     @classmethod
     def of(

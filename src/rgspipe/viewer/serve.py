@@ -9,6 +9,7 @@ import logging
 import re
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ from rgspipe.renderer.frozen import FrozenScene
 from rgspipe.scene import Camera
 from rgspipe.scene.arrays import ArrayLike, as_tensor
 from rgspipe.scene.lights import Light, as_rig
+from rgspipe.viewer.astray import astray
 from rgspipe.viewer.cameras import first_camera, pose_of
 from rgspipe.viewer.given import Masks, as_photographs
 from rgspipe.viewer.lamp_images import LampImages
@@ -236,7 +238,8 @@ def view(
         raise InputError("emitters", expected='"auto", masks or None', found=repr(emitters), remedy="Choose one.")
     photographs = as_photographs(cameras, images, masks, emitters if is_told else None)
     own = [Case("given", photographs, found=found)] if found is not None or photographs else []
-    every, known = (*own, *cases), tuple(references)
+    centers, known = scene.surfels.centers, tuple(references)
+    every = [replace(case, warning=astray(case.photographs, centers)) for case in (*own, *cases)]
     taken = [photograph for case in every for photograph in case.photographs]
     camera = camera or (taken[0].camera if taken else first_camera(*scene.bounds))
     is_open = address not in (LOOPBACK, "localhost")
