@@ -145,6 +145,7 @@ def test_what_a_fit_left_open_is_looked_for_again(frozen: FrozenScene) -> None:
             {"cameras": room_cameras(8)[0], "images": torch.ones(8, 8, 3), "masks": 255 * torch.ones(8, 8)},
             "masks[0]: expected values from 0 to 1, found values from 255 to 255",
         ),
+        ({"lights": dark_result(1.0)}, "lights: expected a light or a list of them, found FitResult. Pass it as fit"),
         ({"emitters": "all"}, 'emitters: expected "auto", masks or None'),
     ],
 )

@@ -229,6 +229,9 @@ def view(
         raise InputError("scene", expected="a FrozenScene", found=type(scene).__name__, remedy=remedy)
     if not 32 <= resolution <= 2048:
         raise InputError("resolution", expected="32 to 2048 pixels", found=str(resolution), remedy="256 is usual.")
+    if isinstance(lights, FitResult):
+        remedy = "Pass it as fit, which shows its lamps with their regions."
+        raise InputError("lights", expected="a light or a list of them", found="FitResult", remedy=remedy)
     rig = None
     if lights is not None:
         rig = tuple(light.to(torch.float64).detached() for light in as_rig(lights))
