@@ -29,10 +29,11 @@ def targets(views: int, errors: tuple[float, ...], inside: bool = True, result: 
         dict.fromkeys(TARGET_COLUMNS, math.nan)
         | {"target": f"{name}_000", "occlusion": name, "method": "search_lm", "views": views}
         | {"position_error": error, "intensity_error": 0.02, "seconds": 0.5, "success": error <= 0.01}
-        | {"position_sd": error, "inside_95": inside, "result": result, "reason": ""}
+        | {"position_sd": error, "noise_sd": 0.5 * error, "noise_allows": 0.5 * error <= 0.01}
+        | {"inside_95": inside, "result": result, "reason": ""}
         for name, error in zip(CLASSES, errors, strict=False)
     ]
-    return pd.DataFrame(rows).astype({"success": "boolean", "inside_95": "boolean"})
+    return pd.DataFrame(rows).astype(dict.fromkeys(("success", "noise_allows", "inside_95"), "boolean"))
 
 
 def five_rooms() -> pd.DataFrame:

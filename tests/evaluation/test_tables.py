@@ -123,6 +123,18 @@ def test_exemplars_without_truth_go_by_psnr():
     assert chosen == {"unknown": {"median": "c", "worst": "a"}}
 
 
+def test_what_noise_allows_is_compared_with_the_limit_where_it_is_known():
+    names = [("much", "visible"), ("little", "visible"), ("unknown", "visible")]
+    truths = {name: (_light(0, 0, 0),) for name, _ in names}
+    spread = np.diag([1e-4, 4e-4, 4e-4, 1.0])
+    bounds = {"much": [spread], "little": [0.1 * spread]}
+    table = target_table(_results(names), truths, truths, 2.0, 0.01, noise_bounds=bounds).set_index("target")
+    assert table["noise_sd"].tolist()[:2] == pytest.approx([0.015, 0.015 * math.sqrt(0.1)])
+    assert table.loc[["much", "little"], "noise_allows"].tolist() == [False, True]
+    assert math.isnan(table.loc["unknown", "noise_sd"]) and table.loc[["unknown"], "noise_allows"].isna().all()
+    assert table["position_sd"].isna().all()
+
+
 def test_regions_are_judged_where_truth_and_covariance_are_known():
     names = [("in", "visible"), ("out", "visible"), ("silent", "visible"), ("many", "visible")]
     truths = {name: (_light(0, 0, 0),) for name, _ in names}

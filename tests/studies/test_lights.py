@@ -24,6 +24,8 @@ def _targets(views: int = 1) -> pd.DataFrame:
             "success": pd.array([True, False, False, False], dtype="boolean"),
             "inside_95": pd.array([True, True, False, pd.NA], dtype="boolean"),
             "position_sd": [0.002, 0.02, 0.001, math.nan],
+            "noise_sd": [0.001, 0.015, 0.0005, math.nan],
+            "noise_allows": pd.array([True, False, True, pd.NA], dtype="boolean"),
             "result": ["converged", "converged", "converged", "ambiguous"],
             "axis_error": [math.nan, 0.5, 1.5, math.nan],
             "shape_error": math.nan,
@@ -46,6 +48,7 @@ def test_a_case_has_a_row_for_each_class_and_one_for_all() -> None:
     assert whole["count"] == whole["with_truth"] == 4 and whole["position"] == pytest.approx(0.025)
     assert whole["position_low"] == 0.002 and whole["position_high"] == math.inf
     assert (whole["success"], whole["inside_95"]) == (0.25, pytest.approx(2 / 3))
+    assert whole["noise"] == 0.001 and whole["noise_allows"] == pytest.approx(2 / 3)
     assert whole["stated"] == 0.002 and whole["converged"] == 0.75 and whole["ambiguous"] == 0.25
     assert whole["axis"] == 1.0 and math.isnan(whole["shape"]) and whole["right_number"] == 0.75
     assert whole["right_types"] == 0.5

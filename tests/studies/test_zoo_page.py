@@ -23,7 +23,7 @@ def test_odd_and_even_seeds_are_reported_apart() -> None:
 def test_what_went_wrong_is_named() -> None:
     parts = _parts()
     assert "### Wrong without a word" in parts[WORK] and "Wrong without" not in parts[FINAL]
-    assert "| 1 | clean | occluded | 3 | 5.00% | 5.00% | 35.0 | 20.0% | fair | converged |" in parts[WORK]
+    assert "| 1 | clean | occluded | 3 | 5.00% | 5.00% | 2.50% | 35.0 | 20.0% | fair | converged |" in parts[WORK]
     assert "### Graded good, and off by more than 3 %" in parts[WORK] and "Graded good" not in parts[FINAL]
     assert parts[WORK].count(r"no place \| for a camera") == 1, "once, not for each number of views and class"
     assert "| 2 | clean | train_surfels | the loss is NaN |" in parts[FINAL]

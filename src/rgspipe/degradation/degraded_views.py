@@ -109,12 +109,17 @@ def _holes(shape: Sequence[int], share: float, rng: np.random.Generator) -> np.n
 
 
 def _noisy_image(view: View, deviation: float, rng: np.random.Generator) -> Tensor:
-    """Noise on the radiance, √(value² + (READ_NOISE · brightest)²) of it; nothing outside of the alpha mask."""
-    image = view.image.double()
-    bright = READ_NOISE * torch.quantile(image.reshape(-1), BRIGHT)
-    normal = torch.from_numpy(rng.standard_normal(tuple(image.shape)))
-    noise = deviation * torch.sqrt(image.square() + bright.square()) * normal
-    return (image + noise * view.alpha[..., None]).to(view.image.dtype)
+    """Noise on the radiance; nothing outside of the alpha mask."""
+    normal = torch.from_numpy(rng.standard_normal(tuple(view.image.shape)))
+    noise = noise_deviation(view.image, deviation) * normal
+    return (view.image.double() + noise * view.alpha[..., None]).to(view.image.dtype)
+
+
+def noise_deviation(image: Tensor, relative: float) -> Tensor:
+    """(H, W, 3) float64 deviation of each value's noise, `relative` · √(value² + (READ_NOISE · brightest)²)."""
+    values = image.double()
+    bright = READ_NOISE * torch.quantile(values.reshape(-1), BRIGHT)
+    return relative * torch.sqrt(values.square() + bright.square())
 
 
 def _moved(light: PointLight | None, capture: ViewErrors, rng: np.random.Generator) -> PointLight | None:

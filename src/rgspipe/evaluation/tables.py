@@ -38,6 +38,8 @@ TARGET_COLUMNS = (
     "count_right",
     "types_right",
     "position_sd",
+    "noise_sd",
+    "noise_allows",
     "inside_95",
     "x",
     "y",
@@ -64,6 +66,7 @@ def target_table(
     scene_size: float,
     success_limit: float = metrics.SUCCESS_LIMIT,
     covariances: Mapping[str, Sequence[ArrayLike]] | None = None,
+    noise_bounds: Mapping[str, Sequence[ArrayLike]] | None = None,
 ) -> pd.DataFrame:
     """One row a target: what was fitted, what was true, and the errors.
 
@@ -75,6 +78,7 @@ def target_table(
         scene_size: longest side of the scene's bounding box; NaN if unknown (no position errors then).
         success_limit: position error up to which a target is solved.
         covariances: per target one of each recovered light, the position first; none for targets without.
+        noise_bounds: per target the least covariance of each true light that its noise allows, likewise.
 
     Returns:
         A table with `TARGET_COLUMNS`. `success` is True, False or missing; a rig with lights too many
@@ -83,7 +87,8 @@ def target_table(
         whose unit `shape_error` is. Positions and intensities are those of the true rig's first light and of the
         estimate matched to it. `position_sd` is the error that the fit expects of itself
         (`calibration.position_sd`), `inside_95` whether the true positions lie inside its 95 % regions; missing
-        where that cannot be told or the number of lights is wrong.
+        where that cannot be told or the number of lights is wrong. `noise_sd` is the least error that the target's
+        noise allows, and `noise_allows` whether that is within the limit; missing where no noise is known.
     """
     required = ("target", "occlusion", "method", "views", "seconds")
     missing = [name for name in required if name not in results.columns]
@@ -97,6 +102,7 @@ def target_table(
             scene_size,
             success_limit,
             (covariances or {}).get(row["target"], ()),
+            (noise_bounds or {}).get(row["target"], ()),
         )
         for row in results.to_dict("records")
     ]
@@ -106,6 +112,7 @@ def target_table(
             "success": "boolean",
             "count_right": "boolean",
             "types_right": "boolean",
+            "noise_allows": "boolean",
             "inside_95": "boolean",
             "views": int,
             "lights_found": int,
@@ -139,6 +146,7 @@ def _target_row(
     scene_size: float,
     limit: float,
     covariances: Sequence[ArrayLike],
+    bounds: Sequence[ArrayLike],
 ) -> dict:
     position, intensity, axis, shape, solved = math.nan, math.nan, math.nan, math.nan, None
     pairs: tuple[tuple[int, int], ...] = ()
@@ -152,8 +160,8 @@ def _target_row(
     shown = estimate[pairs[0][0]] if pairs else (estimate[0] if estimate else None)
     true_light = truth[pairs[0][1]] if pairs else (truth[0] if truth else None)
     size = scene_size if math.isfinite(scene_size) else 1.0
-    spreads = zip(estimate, covariances, strict=False)
-    positions = [to_array(light.standing_spread(matrix, size)) for light, matrix in spreads]
+    positions = _positions(estimate, covariances, size)
+    noise = calibration.position_sd(_positions(truth, bounds, size), scene_size)
     shown_spread = positions[pairs[0][0] if pairs else 0] if positions else None
     return (
         {name: row[name] for name in ("target", "occlusion", "method", "views", "seconds")}
@@ -165,11 +173,18 @@ def _target_row(
         | {"psnr": _number(row.get("psnr")), "result": row.get("result", ""), "reason": row.get("reason", "")}
         | {"lights_found": len(estimate), "lights_true": len(truth) if truth else None}
         | {"position_sd": calibration.position_sd(positions, scene_size)}
+        | {"noise_sd": noise, "noise_allows": None if math.isnan(noise) else noise <= limit}
         | {"inside_95": _inside(estimate, truth, positions, pairs, size)}
         | _light_columns(shown, "")
         | _light_columns(true_light, "_true")
         | _variance_columns(shown_spread)
     )
+
+
+def _positions(rig: LightRig, covariances: Sequence[ArrayLike], size: float) -> list[npt.NDArray]:
+    """(3, 3) of where each light stands."""
+    pairs = zip(rig, covariances, strict=False)
+    return [to_array(light.standing_spread(matrix, size)) for light, matrix in pairs]
 
 
 def _types_right(estimate: LightRig, truth: LightRig, pairs: Sequence[tuple[int, int]]) -> bool | None:

@@ -35,7 +35,11 @@ SHARES = {
     "inside_95": "inside_95",
     "right_number": "count_right",
     "right_types": "types_right",
+    "noise_allows": "noise_allows",
 }
+
+#: Medians of what fits expect of themselves, and of the least that noise allows, likewise.
+STATED = {"stated": "position_sd", "noise": "noise_sd"}
 
 #: What names a row.
 KEYS = ["scene", "case", "method", "views", "occlusion"]
@@ -59,7 +63,8 @@ def case_rows(
         - `success` (within the limit, with the right number of lights), `inside_95` (the truth lies inside the region
           that the fit states for 95 %), `right_number` (of lights) and `right_types` (their number is right, and each
           is a point or a spot where it should be): shares of those where it is known, with `_low` and `_high`;
-        - `stated`: the median of the position errors that fits expect of themselves;
+        - `stated`: the median of the position errors that fits expect of themselves, and `noise` of the least that
+          noise allows; `noise_allows` is the share of those that are within the limit, as above;
         - `silent`, likewise: the share of targets with a truth whose fit says that it converged, misses the limit, and
           states no region that holds the truth: wrong without a word;
         - the share of each of `STATUSES`.
@@ -119,7 +124,8 @@ def figures(group: pd.DataFrame, seed: int, resamples: int = metrics.RESAMPLES) 
     found["shape_kind"] = common_shape_kind(group)
     for name, column in SHARES.items():
         found |= _share(name, group[column])
-    found["stated"] = float(group["position_sd"].median()) if group["position_sd"].notna().any() else math.nan
+    for name, column in STATED.items():
+        found[name] = float(group[column].median()) if group[column].notna().any() else math.nan
     found |= _share("silent", silent(group)[known])
     return found | {status: float((group["result"] == status).mean()) for status in STATUSES}
 

@@ -20,7 +20,7 @@ from rgspipe.studies.lights import figures, silent
 FAILED = "failed"
 
 #: Columns that are true, false or not known, and numbers that a room may lack.
-VERDICTS = ("success", "inside_95", "count_right", "types_right")
+VERDICTS = ("success", "inside_95", "count_right", "types_right", "noise_allows")
 MEASURED = ("lens", "unseen", "guessed", "surfels", "held_out_psnr", "training_seconds", "grade_error")
 
 #: Ranges of properties: column, and the least value of each range but the first.

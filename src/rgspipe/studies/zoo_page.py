@@ -16,8 +16,10 @@ from rgspipe.studies.zoo_rooms import FINAL, WORK
 NOTE = (
     "Medians with 95 % bootstrap intervals, shares with Wilson’s, both as if fits of one room were independent; "
     "position errors are parts of the room’s longest side. Stated: the median of the root mean square position errors "
-    "that fits expect of themselves. Silent: the fit says converged, is off by more than the "
-    "limit, and no region that it states holds the truth. A room that could not be trained or fitted counts as not "
+    "that fits expect of themselves. Noise allows: lights whose least error, as far as the noise of their images goes, "
+    "is within the limit, and at best: the median of that error (Cramér and Rao); both with the scene that was trained "
+    "in place of the true one. Silent: the fit says converged, is off by more than the limit, and no region that it "
+    "states holds the truth. A room that could not be trained or fitted counts as not "
     "solved, with infinite errors."
 )
 
@@ -55,6 +57,7 @@ WRONG = {
     "views": ("views", ""),
     "position_error": ("position error", ".2%"),
     "position_sd": ("stated", ".2%"),
+    "noise_sd": ("at best", ".2%"),
     "held_out_psnr": ("PSNR (dB)", ".1f"),
     "guessed": ("guessed", ".1%"),
     "grade": ("grade", ""),
@@ -96,7 +99,7 @@ def page(table: pd.DataFrame, summary: pd.DataFrame) -> str:
 def _figures(summary: pd.DataFrame) -> str:
     alike = several(summary, ["case", "method"])
     headings = [*alike, "property", "value", "views", "rooms", "fits", "solved", "position error"]
-    headings += ["stated", "truth in 95 % region", "silent"]
+    headings += ["noise allows", "at best", "stated", "truth in 95 % region", "silent"]
     return markdown_lines(headings, [_cells(row, alike) for row in summary.to_dict("records")])
 
 
@@ -105,6 +108,7 @@ def _cells(row: Row, alike: list[str]) -> list[str]:
     cells = [str(row[name]) for name in alike] + [PROPERTIES.get(row["property"], row["property"]), value]
     cells += [str(row["views"]), str(row["rooms"]), str(row["count"])]
     cells += [with_interval(row, "success", 0), with_interval(row, "position", 2)]
+    cells += [percent(row["noise_allows"], 0), percent(row["noise"])]
     return [*cells, percent(row["stated"]), percent(row["inside_95"], 0), with_interval(row, "silent", 0)]
 
 

@@ -21,6 +21,7 @@ of their regions (`evaluation.known_lamps`).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -28,6 +29,7 @@ from torch import Tensor
 
 from rgspipe.fitting.certainty.guessed_shadows import shadow_scores
 from rgspipe.fitting.certainty.guesses import guess_scores
+from rgspipe.fitting.model.emitter import Emitter
 from rgspipe.fitting.model.moments import group_moments, information, scores
 from rgspipe.fitting.model.problem import ROUNDING, LightProblem
 from rgspipe.fitting.model.views import PreparedViews
@@ -66,21 +68,37 @@ def light_covariances(
     Args:
         displaced: whether places of guessed surfaces are in doubt, too; each whose shadow is seen takes an image.
     """
-    owners = torch.cat([torch.full((emitter.parameters,), index) for index, emitter in enumerate(state.emitters)])
+    owners = _owners(state.emitters)
     blocks, strengths = [], []
     for joint, unknown in _joint(problem, state, options or CertaintyOptions(), displaced):
-        per_light = []
-        for index, emitter in enumerate(state.emitters):
-            colours = len(owners) + 3 * index + torch.arange(3)
-            chosen = torch.cat([(owners == index).nonzero()[:, 0], colours])
-            spread = torch.block_diag(emitter.spread(), problem.scale * torch.eye(3, dtype=torch.float64))
-            undetermined = (spread.abs() @ unknown[chosen].double()) > 0.0
-            per_light.append(_open(spread @ joint[chosen][:, chosen] @ spread.T, undetermined))
-        blocks.append(tuple(per_light))
+        blocks.append(light_blocks(state.emitters, joint, unknown, problem.scale))
         rows = len(owners) + 3 * len(state.emitters) + 3 * torch.arange(len(problem.known))[:, None] + torch.arange(3)
         pairs = zip(problem.known, rows, strict=True)
         strengths.append(tuple(_open(one.unit**2 * joint[row][:, row], unknown[row]) for one, row in pairs))
     return Covariances(*blocks, known=strengths[0])
+
+
+def light_blocks(emitters: Sequence[Emitter], joint: Tensor, unknown: Tensor, scale: float) -> tuple[Tensor, ...]:
+    """Per light the covariance of its own numbers and intensity, see `FitResult.covariance`.
+
+    Args:
+        joint: (n, n) covariance of all unknowns: the parameters of one light after the other, then the intensities.
+        unknown: (n,) bool, which of them are not determined.
+        scale: what intensities are over there.
+    """
+    owners, blocks = _owners(emitters), []
+    for index, emitter in enumerate(emitters):
+        colours = len(owners) + 3 * index + torch.arange(3)
+        chosen = torch.cat([(owners == index).nonzero()[:, 0], colours])
+        spread = torch.block_diag(emitter.spread(), scale * torch.eye(3, dtype=torch.float64))
+        undetermined = (spread.abs() @ unknown[chosen].double()) > 0.0
+        blocks.append(_open(spread @ joint[chosen][:, chosen] @ spread.T, undetermined))
+    return tuple(blocks)
+
+
+def _owners(emitters: Sequence[Emitter]) -> Tensor:
+    """(D,) light of each parameter."""
+    return torch.cat([torch.full((emitter.parameters,), index) for index, emitter in enumerate(emitters)])
 
 
 def design_effect(problem: LightProblem, state: State, cell: float) -> float:

@@ -24,6 +24,7 @@ from rgspipe.evaluation.summary import summary_table
 from rgspipe.evaluation.tables import exemplars, target_table
 from rgspipe.scene import Camera, LightRig, PointLight
 from rgspipe.stages.base import Stage, StageContext
+from rgspipe.stages.evaluation.noise import noise_bounds
 from rgspipe.stages.lights.targets import view_keys
 from rgspipe.stages.sources import target_stage
 from rgspipe.stages.targets.true_lights import scene_bounds, truth_file
@@ -52,7 +53,8 @@ def run(context: StageContext) -> None:
     size = math.nan if truth.bounds is None else metrics.longest_side(truth.bounds)
 
     covariances = {name: _covariances(fit, name) for name in estimates}
-    targets = target_table(results, estimates, truth.rigs, size, config.evaluate.success, covariances)
+    bounds = noise_bounds(context, truth.rigs)
+    targets = target_table(results, estimates, truth.rigs, size, config.evaluate.success, covariances, bounds)
     summary = summary_table(targets, config.seed)
     write_text(context.folder / "metrics.csv", targets.to_csv(index=False))
     write_text(context.folder / "summary.csv", summary.to_csv(index=False))
@@ -186,7 +188,7 @@ def _truth_file(config: RgspipeConfig) -> list[Path]:
 
 
 def _keys(config: RgspipeConfig) -> list[str]:
-    keys = ["evaluate", "seed", "fit.target", "light.type", "light.count", *view_keys(config)]
+    keys = ["evaluate", "seed", "fit.target", "light.type", "light.count", "target_capture.noise", *view_keys(config)]
     return keys if config.fit.target is None else [*keys, "fit.truth"]
 
 

@@ -21,6 +21,7 @@ from rgspipe.studies.written import Study
 
 #: What an evaluation says of each target: columns that are not numbers.
 TYPES = {"target": str, "result": str, "reason": str, "success": "boolean", "inside_95": "boolean"}
+TYPES |= {"noise_allows": "boolean"}
 
 
 @dataclass(frozen=True)
