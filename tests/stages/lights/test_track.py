@@ -41,6 +41,23 @@ def test_a_track_is_written_and_compared_with_the_truth(tmp_path: Path) -> None:
     assert context.facts["searched"] == 1 and context.facts["tracked"] + context.facts["traced_back"] == 2
 
 
+def test_frames_whose_masks_leave_next_to_nothing_in_common_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    fitter = Fitter.create(
+        StageContext(RgspipeConfig(stage="track"), {"freeze": frozen_artifact(tmp_path)}, {}, tmp_path)
+    )
+    camera, image = room_cameras(RESOLUTION)[0], torch.ones(RESOLUTION, RESOLUTION, 3)
+    kept = torch.zeros(2, RESOLUTION, RESOLUTION)
+    kept[0, :, : RESOLUTION * 5 // 8] = kept[1, :, RESOLUTION * 3 // 8 :] = 1.0
+    frames = [
+        Target(name, "unknown", (View(name, camera, image, alpha),))
+        for name, alpha in zip(("one", "two"), kept, strict=True)
+    ]
+    track._frames(fitter, frames, fitter.config)
+    assert "the frames together: masks or alpha leave out 75 %" in capsys.readouterr().out
+
+
 def test_frames_share_the_pixels_that_all_show_and_the_cameras(tmp_path: Path) -> None:
     """Alpha that path tracing leaves noisy at edges differs from frame to frame; that is no other camera."""
     freeze = frozen_artifact(tmp_path / "store")

@@ -13,7 +13,8 @@ from rgspipe.datasets.exif_exposure import EXPOSE_ALIKE, check_exposures
 from rgspipe.datasets.views import View
 from rgspipe.degradation.degraded_target import captured
 from rgspipe.errors import InputError
-from rgspipe.fitting.fit import Emitters
+from rgspipe.evidence.masks import masked_out
+from rgspipe.fitting.fit import Emitters, FitViews
 from rgspipe.fitting.model.capture import SATURATED, BaseImages, ImageCapture, stored_in_eight_bits
 
 #: Configuration keys that all this depends on.
@@ -89,6 +90,13 @@ def _base(views: Sequence[View], target: str, config: RgspipeConfig) -> BaseImag
         expected, remedy = "targets without images with the lamps off", "Leave target_capture away."
         raise InputError("target_capture", expected=expected, found=f"some of {target}", remedy=remedy)
     return BaseImages(images, config.fit.base_scale == "free")
+
+
+def tell_masks(where: str, views: Sequence[View], prepared: FitViews) -> None:
+    """Say so if masks leave out most of what the scene shows in these views."""
+    shown = [view.coverage.cpu() >= 0.5 for view in prepared.prepared.views]
+    if line := masked_out(shown, [view.alpha.reshape(-1) for view in views], "what the scene shows in its images"):
+        print(f"{where}: {line}")
 
 
 def known_emitters(views: Sequence[View], config: RgspipeConfig) -> Emitters:

@@ -18,7 +18,6 @@ from rgspipe.datasets.views import Target, View
 from rgspipe.errors import InputError
 from rgspipe.evaluation.fit_folder import read_result, write_result
 from rgspipe.evaluation.grading import graded_words
-from rgspipe.evidence.masks import masked_out
 from rgspipe.fitting import FitViews, PaperAdam, Search, Solver
 from rgspipe.fitting.options import MOST_LIGHTS, AdamOptions, SearchOptions
 from rgspipe.options import Options
@@ -33,7 +32,7 @@ from rgspipe.scene import PointLight
 from rgspipe.scene.grade import Grade
 from rgspipe.stages.base import Stage, StageContext
 from rgspipe.stages.lights.capture import KEYS as CAPTURE_KEYS
-from rgspipe.stages.lights.capture import captured_views, known_emitters
+from rgspipe.stages.lights.capture import captured_views, known_emitters, tell_masks
 from rgspipe.stages.lights.extras import Named, further_files, training_cameras
 from rgspipe.stages.lights.spec import light_keys, light_spec, table_files
 from rgspipe.stages.lights.targets import all_targets, require_views, select_targets, target_seed, used_views, view_keys
@@ -86,10 +85,7 @@ class Fitter:
         chosen = used_views(target, self.config)
         views, capture = captured_views(chosen, target.name, self.config)
         prepared = self.prepare(views)
-        shown = [view.coverage.cpu() >= 0.5 for view in prepared.prepared.views]
-        alphas = [view.alpha.reshape(-1) for view in views]
-        if line := masked_out(shown, alphas, "what the scene shows in its images"):
-            print(f"target {target.name}: {line}")
+        tell_masks(f"target {target.name}", views, prepared)
         taken = [view.image for view in views]
         seed = target_seed(target, self.config)
         if isinstance(self.frozen.solver, MonteCarloSolver):

@@ -26,7 +26,7 @@ from rgspipe.fitting.words import explained
 from rgspipe.scene import LightRig
 from rgspipe.stages.base import Need, Stage, StageContext
 from rgspipe.stages.lights.capture import KEYS as CAPTURE_KEYS
-from rgspipe.stages.lights.capture import captured_views
+from rgspipe.stages.lights.capture import captured_views, tell_masks
 from rgspipe.stages.lights.fit_light import Fitter, band_keys
 from rgspipe.stages.lights.spec import light_keys, table_files
 from rgspipe.stages.lights.targets import used_indices, used_views, view_keys
@@ -82,7 +82,9 @@ def _frames(
                 remedy="Follow frames of fixed cameras.",
             )
     shared = [torch.stack([view.alpha for view in same]).amin(dim=0) for same in zip(first, *others, strict=True)]
-    prepared = fitter.prepare([replace(view, alpha=alpha) for view, alpha in zip(first, shared, strict=True)])
+    kept = [replace(view, alpha=alpha) for view, alpha in zip(first, shared, strict=True)]
+    prepared = fitter.prepare(kept)
+    tell_masks("the frames together", kept, prepared)
     return prepared, [[view.image for view in views] for views, _ in taken], [capture for _, capture in taken]
 
 
