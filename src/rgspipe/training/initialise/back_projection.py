@@ -7,19 +7,26 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.names import NormalSource
 from rgspipe.progress import progress_bar
 from rgspipe.training.initialise.depth_noise import relative_noise
-from rgspipe.training.initialise.normals import normals_from_depth
+from rgspipe.training.initialise.normals import RADII, normals_from_depth
 from rgspipe.training.initialise.sightings import EXACT, Sightings, joined
 
 #: Which normals a view contributes: fitted to its depth, its normal pass, or the pass where there is one.
 
 #: 1/ρ and 1/ρ² of the plastic number ρ, the root of ρ³ = ρ + 1: steps whose multiples fill the unit square evenly.
 PLASTIC = (0.7548776662466927, 0.5698402909980532)
+
+#: Pixels that the smallest window reaches from the one that it is chosen for.
+REACH = RADII[0] + 1
+
+#: Surer sightings that a rough one is compared with.
+NEIGHBOURS = 16
 
 #: A fitted distance that is farther from the measured one, in standard deviations, is of another surface.
 OUTLIER = 5.0
@@ -58,7 +65,9 @@ def see_surfaces(
         raise InputError(where, expected="training views with a depth map", found=found, remedy=DEPTH_HELP)
     share = most / sum(view.depth.numel() for view in with_depth)
     shown = progress_bar(with_depth, "depth", unit="view")
-    seen = joined([_see(view, normals, least_cosine, share, where) for view in shown])
+    parts = [_see(view, normals, least_cosine, share, where) for view in shown]
+    sure, rough, reach = zip(*parts, strict=True)
+    seen = _filled(joined(sure), joined(rough), np.concatenate(reach))
     if not len(seen):
         raise InputError(
             where,
@@ -70,8 +79,23 @@ def see_surfaces(
     return seen
 
 
-def _see(view: View, source: NormalSource, least_cosine: float, share: float, where: str | Path) -> Sightings:
-    """What a share of the pixels of one view saw, in world axes."""
+def _filled(sure: Sightings, rough: Sightings, reach: np.ndarray) -> Sightings:
+    """Sightings, and those rough ones that lie on the plane of no surer one of any view within `reach` (M,)."""
+    if not len(sure) or not len(rough):
+        return sure
+    distance, near = cKDTree(sure.points).query(rough.points, k=min(NEIGHBOURS, len(sure)), workers=-1)
+    distance, near = distance.reshape(len(rough), -1), near.reshape(len(rough), -1)
+    off = np.einsum("mkd,mkd->mk", rough.points[:, None] - sure.points[near], sure.normals[near])
+    explained = (np.abs(off) <= rough.deviations[:, None]) & (distance <= reach[:, None])
+    return joined([sure, rough[~explained.any(axis=1)]])
+
+
+def _see(
+    view: View, source: NormalSource, least_cosine: float, share: float, where: str | Path
+) -> tuple[Sightings, Sightings, np.ndarray]:
+    """What a share of the pixels of one view saw, in world axes; what those saw whose normals are rough; and how far
+    the windows of the latter reach, scene units.
+    """
     depth = view.depth.detach().cpu().double().numpy()
     bad = depth <= 0
     if bad.any():
@@ -84,20 +108,25 @@ def _see(view: View, source: NormalSource, least_cosine: float, share: float, wh
         )
     noise = relative_noise(depth)
     noise = noise if noise > EXACT else 0.0
-    fitted, normals, valid, given = _surface(view, depth, source, noise, where)
+    fitted, normals, valid, rough, given = _surface(view, depth, source, noise, where)
     origins, directions, lengths = (part.numpy() for part in view.camera.rays())
     directions, lengths = directions.reshape(*depth.shape, 3), lengths.reshape(depth.shape)
-    keep = valid & (-(normals * directions).sum(axis=-1) > least_cosine) & _even_part(depth.shape, share)
-    measured, count = lengths[keep] * depth[keep], int(keep.sum())
-    return Sightings(
-        origins=np.repeat(origins[:1], count, axis=0),
-        directions=directions[keep],
-        measured=measured,
-        deviations=max(noise, EXACT) * measured,
-        distances=lengths[keep] * fitted[keep],
-        normals=normals[keep],
-        given=np.full(count, given),
-    )
+    faces = (-(normals * directions).sum(axis=-1) > least_cosine) & _even_part(depth.shape, share)
+
+    def of(keep: np.ndarray) -> Sightings:
+        measured, count = lengths[keep] * depth[keep], int(keep.sum())
+        return Sightings(
+            origins=np.repeat(origins[:1], count, axis=0),
+            directions=directions[keep],
+            measured=measured,
+            deviations=max(noise, EXACT) * measured,
+            distances=lengths[keep] * fitted[keep],
+            normals=normals[keep],
+            given=np.full(count, given),
+        )
+
+    surer, rougher = of(valid & faces), of(rough & faces)
+    return surer, rougher, REACH * rougher.measured / math.sqrt(view.camera.fx * view.camera.fy)
 
 
 def _even_part(shape: tuple[int, int], share: float) -> np.ndarray:
@@ -108,22 +137,25 @@ def _even_part(shape: tuple[int, int], share: float) -> np.ndarray:
 
 def _surface(
     view: View, depth: np.ndarray, source: NormalSource, noise: float, where: str | Path
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Depth (H, W), smoothed if it is noisy, world normals (H, W, 3), the pixels with both, whether from the pass."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Depth (H, W), smoothed if it is noisy, world normals (H, W, 3), the pixels with both, those with rough ones of
+    exact depth, and whether normals are the pass's.
+    """
     given = source == "pass" or (source == "auto" and view.normal is not None)
     normals, valid, fitted = np.zeros((*depth.shape, 3)), np.isfinite(depth), depth
+    rough = np.zeros_like(valid)
     if noise > 0 or not given:
         camera = view.camera
         fits = normals_from_depth(depth, (camera.fx, camera.fy), (camera.cx, camera.cy))
         near = fits.valid & (np.abs(fits.depth - np.where(valid, depth, 0.0)) <= OUTLIER * noise * fits.depth)
         fitted = np.where(near, fits.depth, depth) if noise > 0 else depth
         if not given:
-            valid = near if noise > 0 else fits.valid
+            valid, rough = (near, rough) if noise > 0 else (fits.valid, fits.rough)
             normals = fits.normals @ camera.camera_to_world[:3, :3].double().numpy().T
     if given:
         normals, with_normal = _pass(view, where)
         valid = valid & with_normal
-    return fitted, normals, valid, given
+    return fitted, normals, valid, rough, given
 
 
 def _pass(view: View, where: str | Path) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -65,7 +66,7 @@ class Sightings:
         return replace(self, distances=distances, normals=np.where(self.given[:, None], self.normals, normals))
 
 
-def joined(parts: list[Sightings]) -> Sightings:
+def joined(parts: Sequence[Sightings]) -> Sightings:
     """All sightings of several views."""
     return Sightings(
         **{item.name: np.concatenate([getattr(part, item.name) for part in parts]) for item in fields(Sightings)}
