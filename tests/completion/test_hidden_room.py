@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from half_seen_room import BACK, SIDES, TOP, only, true_room, without_back
 from rgspipe.completion.free_space import Grid
-from rgspipe.completion.hidden_room import part_of_fronts, sees_fronts, with_hidden_room
+from rgspipe.completion.hidden_room import parts_in_sight, sees_fronts, with_hidden_room
 from rgspipe.renderer.kernels.surfel_bvh import SurfelBvh
 from rgspipe.scene import Surfels
 from rgspipe.scene.rectangles import rectangle, solid_box, surfels_on
@@ -40,7 +40,7 @@ def test_in_a_room_all_that_is_met_are_fronts_and_inside_a_thing_none(
     room: SurfelBvh, place: tuple[float, float, float]
 ) -> None:
     point = torch.tensor([place], dtype=torch.float64)
-    part = float(part_of_fronts(room, point))
+    part = float(parts_in_sight(room, point)[0])
     if not bool(inside_the_box(point, -0.05)):
         assert part > 0.85  # measured 0.93 and more: some light passes between surfels this far apart
     elif bool(inside_the_box(point, 0.05)):
@@ -49,7 +49,7 @@ def test_in_a_room_all_that_is_met_are_fronts_and_inside_a_thing_none(
 
 def test_looks_that_could_change_nothing_are_left_out(room: SurfelBvh) -> None:
     points = torch.rand(2000, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
-    fronts = part_of_fronts(room, points) > 0.5
+    fronts = parts_in_sight(room, points)[0] > 0.5
     assert 0.05 < float((~fronts).double().mean()) < 0.95  # 0.065
     assert torch.equal(torch.from_numpy(sees_fronts(room, points)), fronts)
     assert sees_fronts(room, points[:0]).shape == (0,)
@@ -65,7 +65,7 @@ def test_in_the_plane_of_a_hole_it_is_a_half() -> None:
     points = torch.stack([0.5 - distances, torch.zeros(4), torch.zeros(4)], dim=1)
     # Through the hole, a square of side 1, one sees 4 asin(a² / (a² + d²)) of 4 π steradians; a is half the side.
     part = torch.asin(0.25 / (0.25 + distances**2)) / torch.pi
-    torch.testing.assert_close(part_of_fronts(bvh_of(both), points).double(), part, rtol=0.0, atol=0.04)  # 0.031
+    torch.testing.assert_close(parts_in_sight(bvh_of(both), points)[0].double(), part, rtol=0.0, atol=0.04)  # 0.031
 
 
 def test_hidden_room_is_free_and_the_inside_of_things_is_not(room: SurfelBvh) -> None:

@@ -102,11 +102,6 @@ def sees_fronts(bvh: SurfelBvh, points: Tensor) -> np.ndarray:
     return (fronts > LOOKS / 2).numpy()
 
 
-def part_of_fronts(bvh: SurfelBvh, points: Tensor) -> Tensor:
-    """(P,) float32 part of all directions from each of `points` (P, 3) in which the front of a surface is met first."""
-    return parts_in_sight(bvh, points)[0]
-
-
 def parts_in_sight(bvh: SurfelBvh, points: Tensor) -> tuple[Tensor, Tensor]:
     """Parts of all directions from each of `points` (P, 3) in which fronts and backs are met first, float32 (P,) each.
 
