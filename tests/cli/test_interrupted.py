@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from joblib import cpu_count
 
 from rgspipe.store.status import read_statuses
 
@@ -43,11 +44,12 @@ def test_ctrl_c_is_written_down(tmp_path: Path, child_environment: Mapping[str, 
         text=True, start_new_session=True, preexec_fn=partial(signal.signal, signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     deadline = time.monotonic() + 60
-    while not list(tmp_path.glob("outputs/cornell/crunch/.partial-*/begun.txt")):
+    # A process that still imports has no word of its own for Ctrl-C.
+    working = min(2, cpu_count()) if what == "sweep" else 1
+    while len(list(tmp_path.glob("outputs/cornell/crunch/.partial-*/begun.txt"))) < working:
         assert process.poll() is None and time.monotonic() < deadline, process.stdout.read()
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGINT)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == INTERRUPTED and "Interrupted" in output and "Traceback" not in output, output
-    # A sweep had begun with one of its jobs, or both.
     assert {status["state"] for _, status in read_statuses(tmp_path / "outputs" / "runs")} == {"stopped"}
