@@ -1,8 +1,7 @@
 """How often and how soon a browser shows a lamp that is dragged: `python tests/viewer/browser_speed.py [FOLDER]`.
 
-Chromium draws without a GPU, on the same processor that makes the pictures; whose time a picture takes is told of
-Linux. Without the folder of a frozen scene it is
-a Cornell box of 10000 surfels on its true surfaces.
+Chromium draws without a GPU, on the same processor that makes the pictures; whose time a picture takes is told on
+Linux. Without the folder of a frozen scene it is a Cornell box of 10000 surfels on its true surfaces.
 """
 
 from __future__ import annotations
