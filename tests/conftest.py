@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,6 +27,12 @@ settings.load_profile("any_processor")
 pytest_plugins = ["cpu_times"]
 
 TESTS = Path(__file__).resolve().parent
+
+#: In memory what tests write is brought to the disk at once: of `tests/store`, half of the time was waiting for that.
+#: What a run leaves is there until the next one begins; the 64 MB that containers have there are too few.
+MEMORY, ENOUGH = Path("/dev/shm"), 2 << 30
+if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ENOUGH:
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
 
 
 @pytest.fixture(scope="session")
