@@ -35,8 +35,8 @@ def scene() -> FrozenScene:
 
 @pytest.fixture(scope="module")
 def truth() -> FrozenScene:
-    """The same room as sixteen times as many rays find it."""
-    return room(2048, 2500)
+    """The same room as eight times as many rays find it."""
+    return room(1024, 2500)
 
 
 @pytest.mark.slow
@@ -47,7 +47,7 @@ def test_a_lamp_below_the_ceiling_is_not_put_too_low(scene: FrozenScene, truth: 
     views = FitViews.prepare(scene, CAMERAS)
     found = [views.fit(images, solver=solver).lights[0].position for solver in (NEVER, rg.Search())]
     low, right = (float((position.double() - lamp.position).norm()) for position in found)
-    # Measured 0.017 and 0.031 with spots left to patches, 0.005 and 0.008 without.
+    # Measured 0.045 and 0.029 with spots left to patches, 0.005 and 0.008 without.
     assert right < 0.5 * low, (low, right)
 
 
@@ -81,7 +81,7 @@ def test_patches_that_explain_a_little_more_by_noise_are_not_believed(scene: Fro
     surfels = scene.surfels
     waves = 9.0 * surfels.centers.double() @ torch.tensor([[1.0, 0.3, 0.0], [0.2, 1.0, 0.5], [0.0, 0.4, 1.0]]).double()
     albedo = surfels.albedo * (1.0 + 0.25 * waves.sin().prod(dim=1, keepdim=True)).to(surfels.albedo)
-    painted = repainted(truth, replace(surfels, albedo=albedo.clamp(max=0.95)), patches=2500)
+    painted = repainted(truth, replace(surfels, albedo=albedo.clamp(max=0.95)), patches=1500)
     lamp = rg.PointLight([0.398, 0.46, 0.079], 1.0)
     images = [painted.render(camera, lamp) for camera in CAMERAS]
     views = FitViews.prepare(scene, CAMERAS)
