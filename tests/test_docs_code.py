@@ -24,8 +24,14 @@ SCENES = ("tutorial", "cornell")
 SIDE = 48
 
 #: What is smaller here than in the tutorial and the guide, where nobody waits for it: images that are rendered, and
-#: scenes that are made of photographs. The guide's capture takes 7 CPU seconds, and with 600 surfels 26.
-SMALL_TUTORIAL = {"width=128, height=128": "width=40, height=40", "surfels=2000": "surfels=600"}
+#: scenes that are made of photographs. The guide's capture takes 7 CPU seconds, and with 600 surfels 26; the tutorial
+#: takes 22, and with the steps, rays and patches that it has by default 42.
+SMALL_TUTORIAL = {
+    "width=128, height=128": "width=40, height=40",
+    "surfels=2000": "surfels=600",
+    "steps=20": "steps=4, gather_rays=64, patches=100",
+    "trained.surfels)": "trained.surfels, gather_rays=64, patches=100)",
+}
 SMALL_CAPTURE = {"5000": "300"}
 
 
