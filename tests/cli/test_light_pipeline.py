@@ -7,8 +7,9 @@ import itertools
 
 import pytest
 
-from rgspipe.cli.compose import check_sweep, compose_config
+from rgspipe.cli.compose import compose_config
 from rgspipe.cli.sequence import SequenceStep, load_sequence
+from rgspipe.cli.sweep_check import check_sweep
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.stages import NAMES, load_stage
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from rgspipe.cli.compose import check_sweep, compose_config
+from rgspipe.cli.compose import compose_config
 from rgspipe.cli.sequence import SequenceStep, load_sequence, run_sequence
+from rgspipe.cli.sweep_check import check_sweep
 from rgspipe.errors import InputError
 from rgspipe.graph.nodes import Node
 from rgspipe.graph.resolver import resolve

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rgspipe.cli.compose import check_sweep
+from rgspipe.cli.sweep_check import check_sweep
 from rgspipe.errors import InputError
 
 
@@ -16,6 +16,9 @@ from rgspipe.errors import InputError
         (["seed=interval(0,1)"], "seed: expected values"),
         (["seed=range(0,1e9)"], "seed: expected at most 100000 jobs, found 100001 or more"),
         (["seed=range(0,1000)", "views.count=1,2", "dataset.samples=range(1,200)"], "seed.*found 398000 or more"),
+        (["seed=range(0,40)", "views.count=3,2,0"], r"views\.count: expected .* found 0"),
+        (["fit.search={starts: 2}", "fit.search.starts=1,0"], r"starts: expected .* found 0"),
+        (["fit.search.starts=0,1", "fit.search={starts: 2}", "views.count=1,0"], r"views\.count: expected .* found 0"),
         (["seed=1,2", "hydra.launcher.n_jobs=0"], "n_jobs"),
         (["seed=1,2", "hydra.sweep.subdir=../../x"], "subdir.*plain name.*job.num"),
         (["seed=1,2", "hydra.sweep.subdir=''"], "subdir"),

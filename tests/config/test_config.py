@@ -6,7 +6,8 @@ import itertools
 
 import pytest
 
-from rgspipe.cli.compose import check_sweep, compose_config, leaves_machine
+from rgspipe.cli.compose import compose_config, leaves_machine
+from rgspipe.cli.sweep_check import check_sweep
 from rgspipe.config import RgspipeConfig, get_value, with_changes
 from rgspipe.config.core import build, describe, plain
 from rgspipe.errors import InputError

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import toys
-from rgspipe.cli.compose import check_sweep, compose_config, usual_command
+from rgspipe.cli.compose import compose_config, usual_command
+from rgspipe.cli.sweep_check import check_sweep
 from rgspipe.config import RgspipeConfig, with_changes
 from rgspipe.graph.pipeline import Usual, run
 from rgspipe.graph.resolver import resolve

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from functools import cache
@@ -23,7 +22,7 @@ from omegaconf.errors import OmegaConfBaseException
 from rgspipe.cli import DRY_RUN
 from rgspipe.cli.commands import COMMANDS
 from rgspipe.cli.hydra_settings import check_hydra
-from rgspipe.cli.sweep_values import check_jobs, first_value, job_overrides, single_jobs
+from rgspipe.cli.sweep_values import first_value, job_overrides
 from rgspipe.config import RgspipeConfig
 from rgspipe.config.core import build, plain, unknown_key
 from rgspipe.datasets.json_file import shown
@@ -53,9 +52,6 @@ LAUNCHER_GROUPS = ("launcher", "hydra/launcher")
 
 #: The launcher that sends jobs to a cluster.
 SLURM_LAUNCHER = "hydra_plugins.rgspipe_slurm.SlurmLauncher"
-
-#: A sweep may have thousands of values; this many of each key are tried before the first job starts.
-CHECKED_VALUES = 50
 
 
 @cache
@@ -100,14 +96,23 @@ def compose_config(overrides: Sequence[str]) -> RgspipeConfig:
     Raises:
         InputError: an override is misspelt, of the wrong type or out of range.
     """
-    parsed = _parse(overrides)
+    return typed(composed_values(overrides))
+
+
+def composed_values(overrides: Sequence[str]) -> DictConfig:
+    """The configuration of one run as Hydra composes it; what it holds is not looked at yet.
+
+    Raises:
+        InputError: an override is misspelt, or not for a single run.
+    """
+    parsed = parsed_overrides(overrides)
     _check_single(parsed)
     # Before the keys: which of them exist depends on the launcher that is chosen.
     _check_choices(parsed)
     _check_keys(parsed)
     check_hydra(parsed)
     try:
-        return typed(_compose(overrides))
+        return _compose(overrides)
     except (HydraException, OmegaConfBaseException) as error:
         raise _composition_error(error, overrides) from None
 
@@ -119,35 +124,21 @@ def usual_command(overrides: Sequence[str], config: RgspipeConfig, is_all: bool 
         config: of these overrides, or of a sweep's first job.
         is_all: see `Usual`.
     """
-    swept = frozenset(str(override.key_or_group) for override in _parse(overrides) if override.is_sweep_override())
+    swept = frozenset(
+        str(override.key_or_group) for override in parsed_overrides(overrides) if override.is_sweep_override()
+    )
     plain = plain_overrides(overrides, swept)
     return Usual(config if plain == list(overrides) else compose_config(plain), swept, is_all)
 
 
-def check_sweep(overrides: Sequence[str]) -> RgspipeConfig:
-    """Check every value of a sweep before its first job starts.
-
-    Returns:
-        the configuration of the first job.
-    """
-    parsed = _parse(overrides)
-    check_jobs(parsed)
-    first = [first_value(override) for override in parsed]
-    config = compose_config(first)
-    for index, override in enumerate(parsed):
-        for text in itertools.islice(single_jobs(override), 1, CHECKED_VALUES):
-            compose_config([*first[:index], text, *first[index + 1 :]])
-    return config
-
-
 def sweep_jobs(overrides: Sequence[str]) -> list[list[str]]:
     """The overrides of each job of a sweep, in their order."""
-    return list(job_overrides(_parse(overrides)))
+    return list(job_overrides(parsed_overrides(overrides)))
 
 
 def given_folder(overrides: Sequence[str], mode: str) -> Path | None:
     """What `hydra.run.dir` or `hydra.sweep.dir` says, for `mode` "run" or "sweep"; None if it is not among them."""
-    parsed = _parse(overrides)
+    parsed = parsed_overrides(overrides)
     if not any(override.key_or_group == f"hydra.{mode}.dir" for override in parsed):
         return None
     chosen = [first_value(override) for override in parsed]
@@ -159,7 +150,7 @@ def given_folder(overrides: Sequence[str], mode: str) -> Path | None:
 
 def leaves_machine(overrides: Sequence[str]) -> bool:
     """Whether the command line names a launcher that sends jobs to a cluster, where single runs are to go too."""
-    launchers = [override for override in _parse(overrides) if override.key_or_group in LAUNCHER_GROUPS]
+    launchers = [override for override in parsed_overrides(overrides) if override.key_or_group in LAUNCHER_GROUPS]
     if not launchers:
         return False
     _check_choices(override for override in launchers if not override.is_sweep_override())
@@ -179,7 +170,12 @@ def _compose(overrides: Sequence[str], hydra: bool = False) -> DictConfig:
         return compose(CONFIG_NAME, overrides=list(overrides), return_hydra_config=hydra)
 
 
-def _parse(overrides: Sequence[str]) -> list[Override]:
+def parsed_overrides(overrides: Sequence[str]) -> list[Override]:
+    """The overrides of a command line as Hydra reads them.
+
+    Raises:
+        InputError: one is none.
+    """
     for text in overrides:
         if "=" not in text and not text.startswith("~"):
             named, stage = difflib.get_close_matches(text, COMMANDS, n=1), near_stage(text)
@@ -270,8 +266,8 @@ def _may_be_name(value: object) -> bool:
 def _composition_error(error: Exception, overrides: Sequence[str]) -> InputError:
     if isinstance(error, MissingConfigException):
         return _unknown_choice(error)
-    known = _known_keys(_parse(overrides))
-    for override in _parse(overrides):
+    known = _known_keys(parsed_overrides(overrides))
+    for override in parsed_overrides(overrides):
         if override.key_or_group not in known and not override.key_or_group.startswith(FREE_SECTIONS):
             return _unknown(override.key_or_group or repr(override.input_line), known)
     return InputError(

@@ -19,7 +19,6 @@ from rgspipe.cli.compose import (
     CONFIG_NAME,
     HYDRA_VERSION_BASE,
     check_stage,
-    check_sweep,
     compose_config,
     config_folder,
     given_folder,
@@ -31,6 +30,7 @@ from rgspipe.cli.compose import (
 )
 from rgspipe.cli.leading import lead_on, lead_on_sweep
 from rgspipe.cli.messages import EXIT_FAILED, EXIT_INPUT, EXIT_INTERRUPTED, show_failure, show_input_error
+from rgspipe.cli.sweep_check import check_sweep
 from rgspipe.cli.sweep_table import write_sweep_table
 from rgspipe.errors import InputError
 from rgspipe.graph.pipeline import Usual, run

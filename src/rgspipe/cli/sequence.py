@@ -15,10 +15,11 @@ from typing import Any
 
 import yaml
 
-from rgspipe.cli.compose import check_sweep, compose_config, leaves_machine
+from rgspipe.cli.compose import compose_config, leaves_machine
 from rgspipe.cli.jobs import new_run_folder
 from rgspipe.cli.leading import lead_on
 from rgspipe.cli.messages import EXIT_FAILED
+from rgspipe.cli.sweep_check import check_sweep
 from rgspipe.datasets.input_file import input_file
 from rgspipe.errors import InputError
 from rgspipe.machine.resources import resource_folder
