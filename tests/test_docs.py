@@ -127,6 +127,7 @@ def test_pages_are_read_in_one_sitting() -> None:
     assert {_name(page): size for page in kinds if (size := len(page.read_text().split())) > LONGEST} == {}
 
 
+@pytest.mark.slow
 def test_the_site_builds_strictly_and_needs_nothing_from_the_web(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
     environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "NO_MKDOCS_2_WARNING": "1"}

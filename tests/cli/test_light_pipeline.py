@@ -45,14 +45,14 @@ def test_every_step_composes() -> None:
 @pytest.mark.parametrize(("study", "left"), [("views", 0), ("views_corner", 0), ("robustness", 9), ("classes", 0)])
 def test_what_is_swept_is_what_the_studies_need(study: str, left: int) -> None:
     """All of it, but for the single cases of robustness, which the study makes itself."""
-    swept: set[str] = set()
+    sweeps: list[SequenceStep] = []
     for step in load_sequence("lights"):
         if step.stage == "evaluate":
-            swept |= _swept(step)
+            sweeps.append(step)
         elif step.overrides == (f"experiment=light_{study}",):
-            gathered = _gathered(step)
+            gathered, swept = _gathered(step), set[str]().union(*map(_swept, sweeps))
             assert swept <= gathered and len(gathered - swept) == left
             return
         else:
-            swept = set()
+            sweeps.clear()
     pytest.fail("the pipeline has no such study")

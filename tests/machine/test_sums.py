@@ -47,6 +47,7 @@ def test_a_mean_has_the_gradient_of_a_mean() -> None:
     torch.testing.assert_close(gradient, torch.full_like(values, 1.0 / values.numel()), rtol=1e-14, atol=0.0)
 
 
+@pytest.mark.slow
 def test_training_and_fits_are_the_same_for_any_number_of_threads() -> None:
     """Else a sweep of several jobs would make other artifacts than a plain run, under the same fingerprint."""
     found = [outcome(changes) for changes in THREADS]
