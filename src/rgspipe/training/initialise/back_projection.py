@@ -7,25 +7,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from rgspipe.datasets.views import View
 from rgspipe.errors import InputError
 from rgspipe.names import NormalSource
 from rgspipe.progress import progress_bar
 from rgspipe.training.initialise.depth_noise import relative_noise
-from rgspipe.training.initialise.normals import RADII, normals_from_depth
+from rgspipe.training.initialise.normals import normals_from_depth
 from rgspipe.training.initialise.sightings import EXACT, Sightings, joined
+from rgspipe.training.initialise.thin_things import with_thin_things
 
 #: 1/ρ and 1/ρ² of the plastic number ρ, the root of ρ³ = ρ + 1: steps whose multiples fill the unit square evenly.
 PLASTIC = (0.7548776662466927, 0.5698402909980532)
-
-#: Pixels that the smallest window reaches from the one that it is chosen for. Half and twice as many keep 3700 and 2700
-#: rough pixels of a furnished room instead of 3000, and change its surfels by no more than chance does.
-REACH = RADII[0] + 1
-
-#: Surer sightings that a rough one is compared with. Half and twice as many keep 3040 and 2920 instead of 2970.
-NEIGHBOURS = 16
 
 #: A fitted distance that is farther from the measured one, in standard deviations, is of another surface.
 OUTLIER = 5.0
@@ -65,8 +58,8 @@ def see_surfaces(
     share = most / sum(view.depth.numel() for view in with_depth)
     shown = progress_bar(with_depth, "depth", unit="view")
     parts = [_see(view, normals, least_cosine, share, where) for view in shown]
-    sure, rough, reach = zip(*parts, strict=True)
-    seen = _filled(joined(sure), joined(rough), np.concatenate(reach))
+    sure, rest, pixels = zip(*parts, strict=True)
+    seen = with_thin_things(joined(sure), joined(rest), np.concatenate(pixels))
     if not len(seen):
         raise InputError(
             where,
@@ -78,22 +71,11 @@ def see_surfaces(
     return seen
 
 
-def _filled(sure: Sightings, rough: Sightings, reach: np.ndarray) -> Sightings:
-    """Sightings, and those rough ones that lie on the plane of no surer one of any view within `reach` (M,)."""
-    if not len(sure) or not len(rough):
-        return sure
-    distance, near = cKDTree(sure.points).query(rough.points, k=min(NEIGHBOURS, len(sure)), workers=-1)
-    distance, near = distance.reshape(len(rough), -1), near.reshape(len(rough), -1)
-    off = np.einsum("mkd,mkd->mk", rough.points[:, None] - sure.points[near], sure.normals[near])
-    explained = (np.abs(off) <= rough.deviations[:, None]) & (distance <= reach[:, None])
-    return joined([sure, rough[~explained.any(axis=1)]])
-
-
 def _see(
     view: View, source: NormalSource, least_cosine: float, share: float, where: str | Path
 ) -> tuple[Sightings, Sightings, np.ndarray]:
-    """What a share of the pixels of one view saw, in world axes; what those saw whose normals are rough; and how far
-    the windows of the latter reach, scene units.
+    """What a share of the pixels of one view saw, in world axes; what those saw of which no window tells the normal;
+    and how wide a pixel is where these are, scene units.
     """
     depth = view.depth.detach().cpu().double().numpy()
     bad = depth <= 0
@@ -107,25 +89,27 @@ def _see(
         )
     noise = relative_noise(depth)
     noise = noise if noise > EXACT else 0.0
-    fitted, normals, valid, rough, given = _surface(view, depth, source, noise, where)
+    fitted, normals, valid, given = _surface(view, depth, source, noise, where)
     origins, directions, lengths = (part.numpy() for part in view.camera.rays())
     directions, lengths = directions.reshape(*depth.shape, 3), lengths.reshape(depth.shape)
-    faces = (-(normals * directions).sum(axis=-1) > least_cosine) & _even_part(depth.shape, share)
+    kept = _even_part(depth.shape, share)
+    faces = -(normals * directions).sum(axis=-1) > least_cosine
 
-    def of(keep: np.ndarray) -> Sightings:
+    def of(keep: np.ndarray, distances: np.ndarray) -> Sightings:
         measured, count = lengths[keep] * depth[keep], int(keep.sum())
         return Sightings(
             origins=np.repeat(origins[:1], count, axis=0),
             directions=directions[keep],
             measured=measured,
             deviations=max(noise, EXACT) * measured,
-            distances=lengths[keep] * fitted[keep],
+            distances=lengths[keep] * distances[keep],
             normals=normals[keep],
             given=np.full(count, given),
         )
 
-    surer, rougher = of(valid & faces), of(rough & faces)
-    return surer, rougher, REACH * rougher.measured / math.sqrt(view.camera.fx * view.camera.fy)
+    # A pass that has no normal somewhere says that there is no surface.
+    rest = of(kept & np.isfinite(depth) & ~valid & (not given), depth)
+    return of(kept & valid & faces, fitted), rest, rest.measured / math.sqrt(view.camera.fx * view.camera.fy)
 
 
 def _even_part(shape: tuple[int, int], share: float) -> np.ndarray:
@@ -136,25 +120,24 @@ def _even_part(shape: tuple[int, int], share: float) -> np.ndarray:
 
 def _surface(
     view: View, depth: np.ndarray, source: NormalSource, noise: float, where: str | Path
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:
-    """Depth (H, W), smoothed if it is noisy, world normals (H, W, 3), the pixels with both, those with rough ones of
-    exact depth, and whether normals are the pass's.
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Depth (H, W), smoothed if it is noisy, world normals (H, W, 3), the pixels with both, and whether normals are
+    the pass's.
     """
     given = source == "pass" or (source == "auto" and view.normal is not None)
     normals, valid, fitted = np.zeros((*depth.shape, 3)), np.isfinite(depth), depth
-    rough = np.zeros_like(valid)
     if noise > 0 or not given:
         camera = view.camera
         fits = normals_from_depth(depth, (camera.fx, camera.fy), (camera.cx, camera.cy))
         near = fits.valid & (np.abs(fits.depth - np.where(valid, depth, 0.0)) <= OUTLIER * noise * fits.depth)
         fitted = np.where(near, fits.depth, depth) if noise > 0 else depth
         if not given:
-            valid, rough = (near, rough) if noise > 0 else (fits.valid, fits.rough)
+            valid = near if noise > 0 else fits.valid
             normals = fits.normals @ camera.camera_to_world[:3, :3].double().numpy().T
     if given:
         normals, with_normal = _pass(view, where)
         valid = valid & with_normal
-    return fitted, normals, valid, rough, given
+    return fitted, normals, valid, given
 
 
 def _pass(view: View, where: str | Path) -> tuple[np.ndarray, np.ndarray]:

@@ -28,15 +28,12 @@ class PlaneFits:
     Attributes:
         normals: (H, W, 3) float64 unit normals in camera axes that face the camera, 0 where there is none.
         valid: (H, W) the pixels that have one.
-        rough: (H, W) pixels that have one of a window across an edge or a fold that fits nearly as well: not valid,
-            but all that there is of things whose facets are hardly larger than a pixel.
         depth: (H, W) float64 planar depth of the fitted planes, scene units; meaningless where not valid.
         deviation: median relative rms deviation of the depth from the fits.
     """
 
     normals: np.ndarray
     valid: np.ndarray
-    rough: np.ndarray
     depth: np.ndarray
     deviation: float
 
@@ -63,7 +60,8 @@ def normals_from_depth(
         return _fit(depth, focal, center, radius)
     for radius in RADII:
         fits = _fit(depth, focal, center, radius)
-        if fits.deviation <= _tolerated(focal, radius) or 2 * RADII[-1] + 1 > min(depth.shape):
+        turn = fits.deviation * math.sqrt(focal[0] * focal[1]) / math.sqrt(_spread(radius) * (2 * radius + 1) ** 2)
+        if turn <= NOISE_TOLERANCE or 2 * RADII[-1] + 1 > min(depth.shape):
             break
     return fits
 
@@ -100,9 +98,7 @@ def _fit(depth: np.ndarray, focal: tuple[float, float], center: tuple[float, flo
     fitting = deviation[known & np.isfinite(deviation)]
     noise = float(np.median(fitting)) if len(fitting) else 0.0
     at_pixel, per_column, per_row = chosen
-    surface = known & (best < LARGEST_DEVIATION**2 + 2.0 * noise**2) & (at_pixel > 0)
-    straddles = _straddles(best, noise, radius)
-    valid, rough = surface & ~straddles, surface & straddles & (best <= _tolerated(focal, radius) ** 2)
+    valid = known & (best < LARGEST_DEVIATION**2 + 2.0 * noise**2) & ~_straddles(best, noise, radius) & (at_pixel > 0)
     column, row = np.arange(width) + 0.5, (np.arange(height) + 0.5)[:, None]
     a, b = per_column * focal[0], -per_row * focal[1]
     x, y = (column - center[0]) / focal[0], -(row - center[1]) / focal[1]
@@ -110,8 +106,8 @@ def _fit(depth: np.ndarray, focal: tuple[float, float], center: tuple[float, flo
     normals = np.stack([-a, -b, at_pixel - a * x - b * y], axis=-1)
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-300)
     fitted_depth = 1.0 / np.where(at_pixel > 0, at_pixel, np.inf)
-    normals = np.where((valid | rough)[..., None], normals, 0.0)
-    return PlaneFits(normals, valid, rough, fitted_depth, noise)
+    normals = np.where(valid[..., None], normals, 0.0)
+    return PlaneFits(normals, valid, fitted_depth, noise)
 
 
 def _straddles(cost: np.ndarray, noise: float, radius: int) -> np.ndarray:
@@ -121,11 +117,6 @@ def _straddles(cost: np.ndarray, noise: float, radius: int) -> np.ndarray:
     """
     nearby = minimum_filter(cost, 2 * radius + 3)
     return cost > 100.0 * nearby + 9.0 * noise**2 + 1e-10
-
-
-def _tolerated(focal: tuple[float, float], radius: int) -> float:
-    """The relative rms deviation of a window that, as noise, turns its normal by NOISE_TOLERANCE."""
-    return NOISE_TOLERANCE * math.sqrt(_spread(radius) * (2 * radius + 1) ** 2 / (focal[0] * focal[1]))
 
 
 Fits = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]

@@ -7,9 +7,10 @@ from scipy.spatial import cKDTree
 
 from rgspipe.training.initialise.cloud import Cloud
 
-#: Opposite normals are as far apart as points at this many spacings; parallel sheets and the two sides of
-#: an edge therefore never share a surfel.
-NORMAL_WEIGHT = 40.0
+#: Opposite normals are as far apart as points at this many spacings: parallel sheets and the two sides of an edge share
+#: no surfel. The larger it is, the more a surfel of a bent thing stands for what is far away and lies like it: with 2,
+#: 4 and 8, 4.78, 4.49 and 4.54 % of the pixels of views that were left out are off in a furnished room, 6.09 with 40.
+NORMAL_WEIGHT = 4.0
 
 
 def estimate_area(cloud: Cloud) -> float:
@@ -63,6 +64,8 @@ def thin_for(cloud: Cloud, count: int, spacing: float) -> Cloud:
 def even_out(cloud: Cloud, count: int, spacing: float, rng: np.random.Generator, rounds: int = 10) -> Cloud:
     """`count` centres spread evenly over `cloud`: Lloyd's algorithm on position and normal together.
 
+    They begin in cells of a spacing, each as likely as any other: by area things that are narrower than that would get
+    too few.
     Each round moves every centre to the mean of the points that are nearest to it; a centre that has lost
     all of its points starts again at the point that is farthest from any centre.
 
@@ -71,16 +74,18 @@ def even_out(cloud: Cloud, count: int, spacing: float, rng: np.random.Generator,
     """
     if len(cloud) < count:
         raise ValueError(f"{count} centres need as many points, got {len(cloud)}")
-    features = _features(cloud, spacing)
+    points = features(cloud, spacing)
     # Grid cells are denser on slanted surfaces, by |n|₁.
     weights = 1.0 / np.abs(cloud.normals).sum(axis=1)
-    centers = features[rng.choice(len(features), count, replace=False, p=weights / weights.sum())]
+    cell = cells(cloud, spacing)
+    chance = weights / np.bincount(cell)[cell]
+    centers = points[rng.choice(len(points), count, replace=False, p=chance / chance.sum())]
     for _ in range(rounds):
-        distance, label = cKDTree(centers).query(features, workers=-1)
+        distance, label = cKDTree(centers).query(points, workers=-1)
         total = np.bincount(label, weights, count)
-        centers = sums(features * weights[:, None], label, count) / np.maximum(total, 1e-300)[:, None]
+        centers = sums(points * weights[:, None], label, count) / np.maximum(total, 1e-300)[:, None]
         empty = np.flatnonzero(total == 0)
-        centers[empty] = features[np.argsort(-distance, kind="stable")[: len(empty)]]
+        centers[empty] = points[np.argsort(-distance, kind="stable")[: len(empty)]]
     normals = centers[:, 3:]
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return Cloud(centers[:, :3].copy(), normals / np.maximum(length, 1e-300))
@@ -88,17 +93,17 @@ def even_out(cloud: Cloud, count: int, spacing: float, rng: np.random.Generator,
 
 def neighbour_spacing(centers: Cloud, spacing: float, neighbours: int = 4) -> np.ndarray:
     """(N,) mean distance of each centre to its nearest ones of like normal, scene units, at most twice the median."""
-    features = _features(centers, spacing)
-    neighbours = min(neighbours, len(features) - 1)
+    points = features(centers, spacing)
+    neighbours = min(neighbours, len(points) - 1)
     if neighbours == 0:
-        return np.full(len(features), spacing)
-    _, index = cKDTree(features).query(features, k=neighbours + 1, workers=-1)
+        return np.full(len(points), spacing)
+    _, index = cKDTree(points).query(points, k=neighbours + 1, workers=-1)
     distance = np.linalg.norm(centers.points[index[:, 1:]] - centers.points[:, None], axis=-1).mean(axis=1)
     median = float(np.median(distance))
     return np.clip(distance, 0.25 * median, 2.0 * median)
 
 
-def _features(cloud: Cloud, spacing: float) -> np.ndarray:
+def features(cloud: Cloud, spacing: float) -> np.ndarray:
     """(M, 6) points and scaled normals, in which Euclidean distance tells surfaces apart."""
     return np.concatenate([cloud.points, cloud.normals * (0.5 * NORMAL_WEIGHT * spacing)], axis=1)
 
