@@ -64,7 +64,7 @@ def see_surfaces(
         raise InputError(
             where,
             expected="depth maps that show surfaces",
-            found=f"no pixel of {len(with_depth)} depth maps on a surface (all infinite, or without a planar patch)",
+            found=f"no pixel of {len(with_depth)} depth maps on a surface (all infinite or unknown)",
             remedy="Check that the cameras look at the scene, that depth is in scene units, and that only the "
             "background is infinite.",
         )

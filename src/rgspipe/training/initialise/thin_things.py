@@ -7,6 +7,8 @@ is C⁻¹ v, which is across a plane, across a line and towards the camera, and 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -24,6 +26,9 @@ NEIGHBOURS = 64
 #: are off in one furnished room (82), and 4.12, 4.35 and 4.12 % in another (81).
 AROUND = 3.0
 
+#: Sightings that are asked at once, some 300 MB: where depth is sparse none of its pixels has a window.
+AT_ONCE = 65_536
+
 
 def with_thin_things(sure: Sightings, rest: Sightings, pixels: np.ndarray) -> Sightings:
     """Sightings, and those of the `rest` that lie on no plane of a surer one of any view, with normals.
@@ -39,30 +44,43 @@ def with_thin_things(sure: Sightings, rest: Sightings, pixels: np.ndarray) -> Si
 
 def _explained(sure: Sightings, rest: Sightings, reach: np.ndarray) -> np.ndarray:
     """(M,) whether a sighting is on the plane of a surer one within `reach` (M,)."""
-    if not len(sure) or not len(rest):
-        return np.zeros(len(rest), dtype=bool)
-    near, distance = _nearest(sure.points, rest.points)
-    off = np.einsum("mkd,mkd->mk", rest.points[:, None] - sure.points[near], sure.normals[near])
-    return ((np.abs(off) <= rest.deviations[:, None]) & (distance <= reach[:, None])).any(axis=1)
+    explained = np.zeros(len(rest), dtype=bool)
+    if not len(sure):
+        return explained
+    points, surer, tree = rest.points, sure.points, cKDTree(sure.points)
+    for part in _parts(len(rest)):
+        near, distance = _nearest(tree, points[part])
+        off = np.einsum("mkd,mkd->mk", points[part, None] - surer[near], sure.normals[near])
+        on_plane = (np.abs(off) <= rest.deviations[part, None]) & (distance <= reach[part, None])
+        explained[part] = on_plane.any(axis=1)
+    return explained
 
 
 def _with_normals(sightings: Sightings, pixels: np.ndarray) -> Sightings:
     """The same, with the normals that their neighbours tell."""
     if not len(sightings):
         return sightings
-    points = sightings.points
-    near, distance = _nearest(points, points)
-    weight = (distance <= AROUND * pixels[:, None]).astype(np.float64)
-    weight /= weight.sum(axis=1, keepdims=True)
-    away = points[near] - np.einsum("mk,mkd->md", weight, points[near])[:, None]
-    # A point is as uncertain as its pixel is wide.
-    scatter = np.einsum("mk,mki,mkj->mij", weight, away, away) + (pixels**2 / 12.0)[:, None, None] * np.eye(3)
-    normals = np.linalg.solve(scatter, -sightings.directions[..., None])[..., 0]
+    points, normals = sightings.points, np.zeros((len(sightings), 3))
+    tree = cKDTree(points)
+    for part in _parts(len(sightings)):
+        near, distance = _nearest(tree, points[part])
+        weight = (distance <= AROUND * pixels[part, None]).astype(np.float64)
+        weight /= weight.sum(axis=1, keepdims=True)
+        away = points[near] - np.einsum("mk,mkd->md", weight, points[near])[:, None]
+        # A point is as uncertain as its pixel is wide.
+        own = (pixels[part] ** 2 / 12.0)[:, None, None] * np.eye(3)
+        scatter = np.einsum("mk,mki,mkj->mij", weight, away, away) + own
+        normals[part] = np.linalg.solve(scatter, -sightings.directions[part, :, None])[..., 0]
     return sightings.moved(sightings.distances, normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
-def _nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The points (M, K) that are nearest to places (M, 3), NEIGHBOURS of them at most, and how far they are."""
-    count = min(NEIGHBOURS, len(points))
-    distance, near = cKDTree(points).query(places, k=count, workers=-1)
+def _parts(count: int) -> Iterator[slice]:
+    """All of so many, few enough at a time for memory."""
+    return (slice(start, start + AT_ONCE) for start in range(0, count, AT_ONCE))
+
+
+def _nearest(tree: cKDTree, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The points (M, K) of a tree that are nearest to places (M, 3), NEIGHBOURS at most, and how far they are."""
+    count = min(NEIGHBOURS, tree.n)
+    distance, near = tree.query(places, k=count, workers=-1)
     return near.reshape(len(places), count), distance.reshape(len(places), count)
