@@ -6,6 +6,9 @@ python -m rgspipe -m stage=evaluate scene=external scene.path=FOLDER views.count
 python tools/foreign_room.py KIND FOLDER --lamps 2
 python -m rgspipe -m stage=evaluate scene=external scene.path=FOLDER scene.lamps=unknown views.count=1,3
 
+python tools/foreign_room.py KIND FOLDER --lamps 2 --ordinary
+python -m rgspipe -m stage=evaluate scene=external scene.path=FOLDER scene.lamps=unknown lamps.exposure=free
+
 All cameras stand along one wall (of an open room or around an object, before it), so that this wall and much of its
 neighbours are seen by none; a capture under unknown lamps is taken from all over the room. Photographs to train from
 are Mitsuba's; those of targets come from each renderer that is named, of the same lamps and cameras. They are
@@ -25,8 +28,10 @@ from typing import Any
 
 import numpy as np
 import OpenEXR
+from PIL import Image
 
 from foreign.cameras import PIXELS, Shot
+from foreign.ordinary import developed, sensed
 from foreign.rooms import FURNITURE, KINDS, Room
 from foreign.shapes import Lamp
 
@@ -52,15 +57,23 @@ def write_split(room: Room, folder: Path, name: str, views: int, samples: int) -
     write_views(room, folder, name, drawn, samples, told=True)
 
 
-def write_capture(room: Room, folder: Path, views: int, samples: int, lamps: int) -> None:
+def write_capture(room: Room, folder: Path, views: int, samples: int, lamps: int, ordinary: bool) -> None:
     """Photographs from all over the room under lamps that are all on; these are written where no fit reads them."""
     on = [Lamp(room.place(), room_intensity(room), BULB) for _ in range(lamps)]
-    write_views(room, folder, "train", ((room.shot_inside(), on) for _ in range(views)), samples, told=False)
+    drawn = ((room.shot_inside(), on) for _ in range(views))
+    write_views(room, folder, "train", drawn, samples, told=False, ordinary=ordinary)
     write_lights(folder, "lamps", on)
 
 
 def write_views(
-    room: Room, folder: Path, name: str, drawn: Iterable[tuple[Shot, Sequence[Lamp]]], samples: int, *, told: bool
+    room: Room,
+    folder: Path,
+    name: str,
+    drawn: Iterable[tuple[Shot, Sequence[Lamp]]],
+    samples: int,
+    *,
+    told: bool,
+    ordinary: bool = False,
 ) -> None:
     """Photographs under the lamps of each as they are drawn, their depth, and the lamp if it is to be told."""
     (folder / name).mkdir(parents=True)
@@ -69,7 +82,11 @@ def write_views(
         path = f"{name}/r_{index:04d}"
         image = photograph(room.shapes, shot, lamps, samples, int(room.rng.integers(2**31)))
         depth = room.surfaces.distances(shot.eye, shot.rays()).reshape(PIXELS, PIXELS)
-        OpenEXR.File({}, {"RGBA": image}).write(str(folder / f"{path}.exr"))
+        if ordinary:
+            depth = sensed(depth, np.random.default_rng(index))
+            Image.fromarray(developed(image)).save(folder / f"{path}.png")
+        else:
+            OpenEXR.File({}, {"RGBA": image}).write(str(folder / f"{path}.exr"))
         OpenEXR.File({}, {"Z": depth.astype(np.float32)}).write(str(folder / f"{path}_depth.exr"))
         known = {"pl_pos": lamps[0].place.tolist(), "pl_intensity": [POWER] * 3} if told else {}
         frames.append(shot.frame(path) | known | {"depth_path": f"{path}_depth.exr"})
@@ -127,13 +144,14 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=64, help="paths a pixel; they decide the noise")
     parser.add_argument("--targets", nargs="+", choices=RENDERERS, default=["mitsuba"], help="who renders the targets")
     parser.add_argument("--lamps", type=int, default=0, help="train from photographs under so many unknown lamps")
+    parser.add_argument("--ordinary", action="store_true", help="a capture in 8 bits, of unknown exposure, noisy depth")
     parser.add_argument("--furniture", type=Path, default=FURNITURE, help="libraries (.sh3f) for a furnished room")
     given = parser.parse_args()
     room = Room(given.kind, given.seed, given.furniture)
     given.folder.mkdir(parents=True)
     write_json(given.folder / "dataset_info.json", {"version": 1, "depth_convention": "ray_distance"})
     if given.lamps:
-        write_capture(room, given.folder, given.views, given.samples, given.lamps)
+        write_capture(room, given.folder, given.views, given.samples, given.lamps, given.ordinary)
     else:
         write_split(room, given.folder, "train", given.views, given.samples)
     write_split(room, given.folder, "test", 6, 16 * given.samples)

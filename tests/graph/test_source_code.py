@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rgspipe.graph.source_code import SourceCode, parse
+from rgspipe.graph.source_code import SourceCode
+from rgspipe.graph.source_text import parse
 
 PLAIN = "def double(x):\n    return 2 * x\n"
 SAME = '"""About."""\n\n# A comment.\ndef double(x):\n    """Twice."""\n    "more"\n    return 2*x  # so\n'

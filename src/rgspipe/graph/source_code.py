@@ -2,37 +2,18 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import importlib.util
 import os
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 
+from rgspipe.graph.source_cache import SourceCache
 from rgspipe.store.fingerprints import fingerprint
 
 #: The package whose modules count, besides that of the module that is asked about.
 OWN = __name__.partition(".")[0]
-
-#: What may be the name of a module in a package.
-DOTTED = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+")
-
-
-@dataclass(frozen=True)
-class Source:
-    """What one file of Python does.
-
-    Attributes:
-        digest: of its syntax tree; comments, docstrings, formatting and imports for types alone leave it as it is.
-        names: all that may name a module it runs: what it imports, wherever it does, and strings that look like a
-            module's name: by one, `python -m` starts a module, and a loader of data files finds its package.
-    """
-
-    digest: str
-    names: frozenset[str]
 
 
 @dataclass
@@ -45,6 +26,7 @@ class SourceCode:
 
     passed_over: Sequence[str] = ()
     _files: dict[str, dict[str, Path]] = field(default_factory=dict)
+    _caches: dict[str, SourceCache] = field(default_factory=dict)
     _sources: dict[str, tuple[str, frozenset[str]]] = field(default_factory=dict)
     _named: dict[str, str | None] = field(default_factory=dict)
     _found: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -74,6 +56,8 @@ class SourceCode:
                 digests[name], names = self._read(name)
                 found = (self._module(text) for text in names if text.partition(".")[0] in tops)
                 open_ends += [other for other in found if other is not None]
+        for kept in self._caches.values():
+            kept.save()
         return dict(sorted(digests.items()))
 
     def _module(self, text: str) -> str | None:
@@ -88,13 +72,16 @@ class SourceCode:
     def _modules(self, name: str) -> dict[str, Path]:
         top = name.partition(".")[0]
         if top not in self._files:
-            self._files[top] = _module_files(top)
+            origin = _origin(top)
+            self._files[top] = {} if origin is None else _module_files(top, origin)
+            if origin is not None:
+                self._caches[top] = SourceCache(origin)
         return self._files[top]
 
     def _read(self, name: str) -> tuple[str, frozenset[str]]:
         if name not in self._sources:
             path = self._modules(name)[name]
-            source = parse(path.read_text(encoding="utf-8"))
+            source = self._caches[name.partition(".")[0]].source(name, path.read_text(encoding="utf-8"))
             is_package = path.name == "__init__.py"
             package = name if is_package else name.rpartition(".")[0]
             names = frozenset(importlib.util.resolve_name(text, package) for text in source.names)
@@ -103,70 +90,14 @@ class SourceCode:
         return self._sources[name]
 
 
-@cache
-def parse(text: str) -> Source:
-    """What a Python file of this text does; equal texts are parsed once a process."""
-    parts: list[str] = []
-    names: set[str] = set()
-    _describe(ast.parse(text), parts, names)
-    return Source(hashlib.sha256(" ".join(parts).encode()).hexdigest(), frozenset(names))
-
-
-def _describe(node: ast.AST, parts: list[str], names: set[str]) -> None:
-    """Append a syntax tree without what does nothing to `parts`, and add what may name a module to `names`.
-
-    As `ast.dump` does, and twice as fast as that and a walk beside it.
-    """
-    if isinstance(node, ast.ImportFrom):
-        origin = "." * node.level + (f"{node.module}." if node.module else "")
-        names.update(origin + name.name for name in node.names)
-    elif isinstance(node, ast.Import):
-        names.update(name.name for name in node.names)
-    elif isinstance(node, ast.Constant) and isinstance(node.value, str) and DOTTED.fullmatch(node.value):
-        names |= {node.value, f"{node.value}.__main__"}
-    parts.append(type(node).__name__)
-    for field_name in node._fields:
-        value = getattr(node, field_name, None)
-        # The context follows from the place, and of type parameters Python before 3.12 has not even an empty list.
-        if field_name == "ctx" or (field_name == "type_params" and not value):
-            continue
-        if isinstance(value, ast.AST):
-            _describe(value, parts, names)
-        elif isinstance(value, list):
-            parts.append("[")
-            for item in value if field_name != "body" else _running(node, value):
-                _describe(item, parts, names) if isinstance(item, ast.AST) else parts.append(repr(item))
-            parts.append("]")
-        else:
-            parts.append(repr(value))
-
-
-def _running(node: ast.AST, body: list[ast.stmt]) -> list[ast.stmt]:
-    """The statements of a body that do something: bare strings do not, nor do imports for types alone."""
-    if isinstance(node, ast.If) and _is_type_checking(node.test):
-        return []
-    return [statement for statement in body if not _is_text(statement)]
-
-
-def _is_type_checking(test: ast.expr) -> bool:
-    return getattr(test, "id", getattr(test, "attr", None)) == "TYPE_CHECKING"
-
-
-def _is_text(statement: ast.stmt) -> bool:
-    """Whether a statement is a bare string: a docstring, or a comment in its place."""
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
-
-
-def _module_files(top: str) -> dict[str, Path]:
-    """The files of a top-level module or package, by the name of the module."""
+def _origin(top: str) -> Path | None:
+    """The file of a top-level module or package."""
     spec = importlib.util.find_spec(top)
-    if spec is None or spec.origin is None:
-        return {}
-    origin = Path(spec.origin)
+    return None if spec is None or spec.origin is None else Path(spec.origin)
+
+
+def _module_files(top: str, origin: Path) -> dict[str, Path]:
+    """The files of a top-level module or package, by the name of the module."""
     if origin.name != "__init__.py":
         return {top: origin}
     files = {}
@@ -181,8 +112,9 @@ def _module_files(top: str) -> dict[str, Path]:
 
 
 def _data_files(folder: Path) -> dict[str, str]:
-    """The digests of all files below a package that are not Python, by path."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.suffix not in (".py", ".pyc"))
+    """The digests of all files below a package that are not Python, nor made of it, by path."""
+    found = (path for path in folder.rglob("*") if "__pycache__" not in path.relative_to(folder).parts)
+    files = sorted(path for path in found if path.is_file() and path.suffix not in (".py", ".pyc"))
     return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
