@@ -60,10 +60,11 @@ def test_lamps_are_counted_by_steps_alone_and_settle_with_bends() -> None:
 
 
 def test_exposures_that_nobody_spoke_of_are_told() -> None:
-    assert "differ in exposure" not in captured_words(found())
+    assert "differ in exposure" not in captured_words(found()) and "unit of their own" not in captured_words(found())
     cameras = replace(found().measured.cameras, exposure="free", gains=np.linspace(0.8, 1.2, 14)[:, None].repeat(3, 1))
     cameras = replace(cameras, vignetting=True, falloff=np.array([-0.3, 0.0]))
     words = captured_words(replace(found(), measured=replace(found().measured, cameras=cameras)))
+    assert "Intensities are in a unit of their own" in words
     assert "differ in exposure, by a factor of up to 1.50" in words and "26 % darker in their corners" in words
 
 

@@ -26,7 +26,16 @@ NOTICEABLE, GLOW = 0.03, 0.05
 def captured_words(found: Captured) -> str:
     """Sentences: the lamps, how sure they are, whether intensities and albedo are told apart, and what to doubt."""
     return " ".join(
-        [_lamps(found), *_rivals(found), _number(found), _even(found), _scale(found), *_unsaid(found), *_doubts(found)]
+        [
+            _lamps(found),
+            *_rivals(found),
+            _number(found),
+            _even(found),
+            _scale(found),
+            *_unit(found),
+            *_unsaid(found),
+            *_doubts(found),
+        ]
     )
 
 
@@ -91,6 +100,15 @@ def _scale(found: Captured) -> str:
         f"Only the products of intensities and albedo are known, their scale to {percent} ({bounced}): surfaces are "
         "expected to reflect about half."
     )
+
+
+def _unit(found: Captured) -> Iterator[str]:
+    """What no photograph tells where each has its own exposure."""
+    if found.measured.cameras.exposure != "same":
+        yield (
+            "Intensities are in a unit of their own, as no photograph tells how long it was exposed: how many times "
+            "brighter one lamp is than another holds, W/sr do not."
+        )
 
 
 def _even(found: Captured) -> str:
