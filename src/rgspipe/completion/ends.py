@@ -6,11 +6,13 @@ faces that a thing turns outwards lie behind each other's planes, so each is cut
 
 Surfels that cameras saw are cut by depth and photographs already (`training.initialise.edges`, `training.refine`), each
 for itself: of those along an edge the ones that reach farthest cast its shadow, a fifteenth of a distance too wide.
-Planes are known far better, so where two of them meet that were seen they say where the edge is.
+Planes are known far better, so where two of them meet that were seen they say where the edge is, unless what is across
+is no plane to speak of, as along rims and legs, where each surfel is turned another way.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +36,9 @@ GOES_ON = 2.0
 
 #: Ends of a surfel whose directions are within this angle [rad] are at one edge.
 TURN = np.radians(20.0)
+
+#: An edge of what was seen is known if the plane across is, to so many distances there: as wide as surfels fade out.
+KNOWN = 0.12
 
 #: Edges a surfel can have.
 MOST = 2
@@ -89,7 +94,7 @@ def ends(
             known = [(offsets[own, k] / spacing, outward[own, k]) for k in np.flatnonzero(offsets[own] < NO_CLIP)]
             # What is guessed may be wrong, and tells of others that were seen no more than where these go on.
             told = (around < seen) | (own >= seen)
-            edges = _edges(away[told], normals[around[told]], normals[own])
+            edges = _edges(away[told], normals[around[told]], normals[own], KNOWN if own < seen else math.inf)
             if own < seen:
                 edges = _agreed(edges, known)
                 beyond, facing = away[~told], normals[around[~told]]
@@ -130,13 +135,14 @@ def _is_along(end: End, other: End) -> bool:
     return float(end[1] @ other[1]) > np.cos(TURN)
 
 
-def _edges(away: np.ndarray, facing: np.ndarray, normal: np.ndarray) -> list[End]:
+def _edges(away: np.ndarray, facing: np.ndarray, normal: np.ndarray, known: float) -> list[End]:
     """How far the edges of a face are from a surfel of it, in its plane, and their (3,) outward directions.
 
     Args:
         away: (K, 3) of the surfels around it, itself among them, from its centre, in distances of neighbours.
         facing: (K, 3) their normals.
         normal: (3,) its own.
+        known: an edge counts if its standard deviation is less.
     """
     turned, height = facing @ normal, away @ normal
     own = away[(turned > ACROSS) & (np.abs(height) < ON_PLANE)]
@@ -154,8 +160,27 @@ def _edges(away: np.ndarray, facing: np.ndarray, normal: np.ndarray) -> list[End
         if _behind(own @ there - plane) and _behind(height[alike]):
             outward = there - (there @ normal) * normal
             length = float(np.linalg.norm(outward))
-            edges.append((plane / length, outward / length))
+            edge = (plane / length, outward / length)
+            if _deviation(away[alike], facing[alike], there, edge[0] * edge[1]) < known * length:
+                edges.append(edge)
     return edges
+
+
+def _deviation(points: np.ndarray, facing: np.ndarray, normal: np.ndarray, place: np.ndarray) -> float:
+    """Standard deviation of where the plane is at `place` (3,) that K surfels tell by their means.
+
+    Args:
+        points: (K, 3) their centres.
+        facing: (K, 3) their normals.
+        normal: (3,) of the plane.
+    """
+    count, middle = len(points), points.mean(axis=0)
+    if count < 2:
+        return math.inf
+    heights = np.square((points - middle) @ normal).sum()
+    turns = 0.5 * np.square(facing - normal).sum()
+    lever = np.square(place - middle).sum() - np.square((place - middle) @ normal)
+    return math.sqrt((heights + turns * max(lever, 0.0)) / (count * (count - 1)))
 
 
 def _behind(heights: np.ndarray) -> bool:
