@@ -142,7 +142,7 @@ def _edges(away: np.ndarray, facing: np.ndarray, normal: np.ndarray, known: floa
         away: (K, 3) of the surfels around it, itself among them, from its centre, in distances of neighbours.
         facing: (K, 3) their normals.
         normal: (3,) its own.
-        known: an edge counts if its standard deviation is less.
+        known: an edge counts if its standard deviation is no more; with infinity even one that a single surfel tells.
     """
     turned, height = facing @ normal, away @ normal
     own = away[(turned > ACROSS) & (np.abs(height) < ON_PLANE)]
@@ -161,7 +161,7 @@ def _edges(away: np.ndarray, facing: np.ndarray, normal: np.ndarray, known: floa
             outward = there - (there @ normal) * normal
             length = float(np.linalg.norm(outward))
             edge = (plane / length, outward / length)
-            if _deviation(away[alike], facing[alike], there, edge[0] * edge[1]) < known * length:
+            if _deviation(away[alike], facing[alike], there, edge[0] * edge[1]) <= known * length:
                 edges.append(edge)
     return edges
 
