@@ -27,7 +27,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def files(folder: str) -> set[str]:
     """What belongs to a folder of the checkout, relative to the folder's own."""
-    found = (path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix != ".pyc")
+    found = (path for path in (ROOT / folder).rglob("*") if path.is_file() and "__pycache__" not in path.parts)
     return {path.relative_to((ROOT / folder).parent).as_posix() for path in found}
 
 
