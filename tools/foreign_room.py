@@ -3,11 +3,8 @@
 python tools/foreign_room.py KIND FOLDER [--seed 1] [--views 40] [--samples 64] [--targets mitsuba radiance luxcore]
 python -m rgspipe -m stage=evaluate scene=external scene.path=FOLDER views.count=1,3
 
-python tools/foreign_room.py KIND FOLDER --lamps 2
+python tools/foreign_room.py KIND FOLDER --lamps 2 [--ordinary]
 python -m rgspipe -m stage=evaluate scene=external scene.path=FOLDER scene.lamps=unknown views.count=1,3
-
-python tools/foreign_room.py KIND FOLDER --lamps 2 --ordinary
-python -m rgspipe -m stage=evaluate scene=external scene.path=FOLDER scene.lamps=unknown lamps.exposure=free
 
 All cameras stand along one wall (of an open room or around an object, before it), so that this wall and much of its
 neighbours are seen by none; a capture under unknown lamps is taken from all over the room. Photographs to train from
@@ -147,6 +144,8 @@ def main() -> None:
     parser.add_argument("--ordinary", action="store_true", help="a capture in 8 bits, of unknown exposure, noisy depth")
     parser.add_argument("--furniture", type=Path, default=FURNITURE, help="libraries (.sh3f) for a furnished room")
     given = parser.parse_args()
+    if given.ordinary and not given.lamps:
+        parser.error("--ordinary: expected a capture, which --lamps N asks for")
     room = Room(given.kind, given.seed, given.furniture)
     given.folder.mkdir(parents=True)
     write_json(given.folder / "dataset_info.json", {"version": 1, "depth_convention": "ray_distance"})
