@@ -100,9 +100,9 @@ class PictureControls:
         session.is_open_to_it = self._around.value
         self._place.visible = axis >= 0
         lower, upper = (corner.double() for corner in session.images.frozen.bounds)
-        session.section = None
-        if axis >= 0:
-            session.section = axis, float(lower[axis] + self._place.value * (upper[axis] - lower[axis]))
+        # In one step: another thread makes pictures meanwhile, and one without the section would flash up.
+        place = float(lower[axis] + self._place.value * (upper[axis] - lower[axis]))
+        session.section = (axis, place) if axis >= 0 else None
         self._changed()
 
 
