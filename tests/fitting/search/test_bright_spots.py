@@ -92,12 +92,15 @@ def test_patches_that_explain_a_little_more_by_noise_are_not_believed(scene: Fro
 
 
 def test_a_refit_sees_spots_as_a_fit_does(scene: FrozenScene, truth: FrozenScene) -> None:
+    """But for the places of their points, which follow from the lamp that one starts with."""
     lamp = rg.PointLight([0.13, 0.11, 0.45], 1.0)
     images = [truth.render(camera, lamp) for camera in CAMERAS]
     views = FitViews.prepare(scene, CAMERAS)
-    found = views.fit(images)
-    again = views.refit(images, found.lights)
-    assert again.lights[0].position.tolist() == pytest.approx(found.lights[0].position.tolist(), abs=1e-3)
+    found, never = (views.fit(images, solver=solver).lights for solver in (rg.Search(), NEVER))
+    [again] = views.refit(images, found).lights
+    near, far = (float((one.position - found[0].position).norm()) for one in (again, never[0]))
+    # Measured 0.0012 and 0.049 (by which it passed or failed an absolute bound of 0.001, as processors round).
+    assert near < 0.1 * far, (near, far)
 
 
 def test_candidates_are_made_once(scene: FrozenScene, truth: FrozenScene, monkeypatch: pytest.MonkeyPatch) -> None:
