@@ -3,8 +3,9 @@
 Steps of the field within a surface are Gaussian and measurements Student's t, so that a patch which differs much from
 what is around it would be taken for outliers, each of its surfels alone. So neighbours are taken apart whose measured
 values z differ by more than ν of their variance, beyond which Student's t gives a step less than half of its weight.
-What that leaves of a surface beside its largest part are islands. An island is paint where its rim is likelier than so
-many outliers, and a surface of its own then:
+Measurements that are much worse than most are left out of that: they would tie what is on either side of them, and take
+the side of the nearest one that is sure. What that leaves of a surface beside its largest part are islands. An island
+is paint where its rim is likelier than so many outliers, and a surface of its own then:
 
     ½ (ν + 1) Σ_i log(1 + r_i² / (ν v_i))  >  ½ (ν + 1) Σ_(i,j) c_ij log(1 + (z_i − z_j)² / (ν v_ij)) ,
 
@@ -34,6 +35,9 @@ from rgspipe.scene.surfels import Surfels
 
 #: Median of the square of a normal number of variance 1: channels are taken to differ alike.
 MIDDLE = quantile(0.5, 1)
+
+#: A measurement is sure whose variance is no more than this times the middle one of its surface.
+SURE = 4.0
 
 #: Rounds in which the variances of surfaces with patches of their own and the outliers on them follow.
 ROUNDS = 3
@@ -80,7 +84,7 @@ class _Islands:
     def apart(self, surfels: Surfels) -> Field:
         """The field with what is paint as surfaces of their own, and all measurements trusted alike."""
         before, numbers = self.field.graph, np.where(self.are_paint[self._numbers], self._numbers, 0)
-        numbers = self._with_unmeasured(numbers)
+        numbers = self._with_unsure(numbers)
         graph = before.without(numbers[before.first] != numbers[before.second], surfels)
         _, one_of = np.unique(graph.surfaces, return_index=True)
         former = before.surfaces[one_of]
@@ -99,10 +103,18 @@ class _Islands:
         return self._told.any(axis=1)
 
     @kept_property
+    def _sure(self) -> NDArray[np.bool_]:
+        """(N,) what is measured well enough to say where paint ends: the rest would tie to what is on either side."""
+        surfaces, known = self.field.graph.surfaces, self._measured
+        middle = self._middle(self._variance[known], surfaces[known])
+        return known & (self._variance <= SURE * middle[surfaces])
+
+    @kept_property
     def _compared(self) -> NDArray[np.bool_]:
-        """(E,) neighbours of which one channel is measured at both."""
-        graph = self.field.graph
-        return self._told_at_both.any(axis=1) & (graph.weight > APART)
+        """(E,) neighbours of which one channel is measured at both, and surely."""
+        graph, sure = self.field.graph, self._sure
+        both = sure[graph.first] & sure[graph.second]
+        return self._told_at_both.any(axis=1) & both & (graph.weight > APART)
 
     @property
     def _told_at_both(self) -> NDArray[np.bool_]:
@@ -129,10 +141,14 @@ class _Islands:
         surfaces = self.field.graph.surfaces
         of = surfaces[self.field.graph.first][self._compared]
         count = np.bincount(of, minlength=surfaces.max() + 1)
-        middle = np.zeros(len(count))
-        some = np.flatnonzero(count)
-        middle[some] = median(self._steps[self._compared], of, some) if len(some) else 0.0
+        middle = self._middle(self._steps[self._compared], of)
         return ((FREEDOM + count * middle / MIDDLE) / (FREEDOM + count))[surfaces]
+
+    def _middle(self, values: Numbers, of: NDArray[np.integer]) -> Numbers:
+        """(S,) the middle one of `values` (K,) that belong to surfaces `of` (K,); 0 where there is none."""
+        middle, some = np.zeros(self.field.graph.surfaces.max() + 1), np.unique(of)
+        middle[some] = median(values, of, some) if len(some) else 0.0
+        return middle
 
     @kept_property
     def _far(self) -> Numbers:
@@ -154,7 +170,7 @@ class _Islands:
         by_size = np.argsort(np.bincount(parts)[parts], kind="stable")
         largest = np.empty(surfaces.max() + 1, dtype=parts.dtype)
         largest[surfaces[by_size]] = parts[by_size]
-        numbers = np.where(self._measured & (parts != largest[surfaces]), parts + 1, 0)
+        numbers = np.where(self._sure & (parts != largest[surfaces]), parts + 1, 0)
         return np.unique(numbers, return_inverse=True)[1]
 
     def _parts(self, joined: NDArray[np.bool_]) -> NDArray[np.integer]:
@@ -191,9 +207,9 @@ class _Islands:
         # Pairs within an island are there both ways round.
         return np.bincount(own, np.where(own == other, 0.5, 1.0) * held * np.log1p(self._far), count)
 
-    def _with_unmeasured(self, numbers: NDArray[np.integer]) -> NDArray[np.integer]:
-        """Numbers (N,), those of what was not measured as the nearest that was has them."""
-        graph, numbers, known = self.field.graph, numbers.copy(), self._measured.copy()
+    def _with_unsure(self, numbers: NDArray[np.integer]) -> NDArray[np.integer]:
+        """Numbers (N,), those of what is not sure as the nearest that is has them."""
+        graph, numbers, known = self.field.graph, numbers.copy(), self._sure.copy()
         order = np.argsort(graph.weight, kind="stable")
         first, second = (part[order][graph.weight[order] > APART] for part in (graph.first, graph.second))
         while (reached := ~known[first] & known[second]).any():

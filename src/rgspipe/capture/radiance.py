@@ -3,12 +3,14 @@
 A diffuse surfel has one radiance in all photographs, whatever its albedo and whatever lights it. So the images are
 linear in the N radiances, with the weights W of the views, and g_v the exposures:
 
-    min over L, g of  Σ_p w_p ( I_p − g_p (W L)_p )² .
+    min over L, g of  Σ_p w_p ( I_p − g_p (W L)_p )² / ( (W L)_p + b )² .
 
-w_p gives little weight to what most pixels contradict (Cauchy's loss on the relative error): edges that are not quite
-where the surfels have them, gloss, people who walked by. Pixels half outside of all surfaces do not count. Saturated
-ones tell only that it is at least so bright: they count for little, so that what another photograph shows of the same
-surface decides, and where none shows more L is the least that it may be.
+Pixels are off by a part of what they show, and b keeps that from meaning too much in the dark. Weighed all alike, the
+light beside dark paint that is little wider than surfels outweighs what shows the paint itself, which then comes out
+grey, or less than black. w_p gives little weight to what most pixels contradict (Cauchy's loss on the relative error):
+edges that are not quite where the surfels have them, gloss, people who walked by. Pixels half outside of all surfaces
+do not count. Saturated ones tell only that it is at least so bright: they count for little, so that what another
+photograph shows of the same surface decides, and where none shows more L is the least that it may be.
 """
 
 from __future__ import annotations
@@ -102,13 +104,17 @@ def measured_radiance(
     photographs = [TracedPhotograph.of(*pair) for pair in zip(weights, views, strict=True)]
     cameras, radiance = Cameras.of(len(views), exposure, vignetting, bent), None
     counted, floor = [photograph.base for photograph in photographs], _floor(photographs)
+    precision = [np.ones_like(weight) for weight in counted]
     for _ in range(ROUNDS):
         plain = [one.plain(weight) for one, weight in zip(photographs, counted, strict=True)]
         cameras = cameras.fitted(photographs, plain, radiance)
-        believed = [one.believed(weight) for one, weight in zip(photographs, counted, strict=True)]
+        parts = zip(photographs, counted, precision, strict=True)
+        believed = [one.believed(weight) * precise for one, weight, precise in parts]
         normal = _normal(photographs, believed)
         radiance = _radiance(photographs, cameras, believed, normal, radiance)
-        off, relative = _errors(photographs, cameras, radiance, floor)
+        off, expected = _errors(photographs, cameras, radiance, floor)
+        relative = [part / whole for part, whole in zip(off, expected, strict=True)]
+        precision = [(floor / whole) ** 2 for whole in expected]
         error = _typical(photographs, relative)
         latest, limit = counted, max(OUTLIER * error, 1e-6)
         counted = [one.base / (1.0 + (part / limit) ** 2) for one, part in zip(photographs, relative, strict=True)]
@@ -156,20 +162,20 @@ def _floor(photographs: Sequence[TracedPhotograph]) -> float:
     grey = np.concatenate(
         [photograph.image.mean(axis=1)[photograph.plain(photograph.base) > 0.0] for photograph in photographs]
     )
-    return FLOOR * float(np.quantile(grey, 0.99)) if len(grey) else 1.0
+    # Where nearly all is black, the brightest pixel has to do.
+    return FLOOR * float(np.quantile(grey, 0.99) or grey.max() or 1.0) if len(grey) else 1.0
 
 
 def _errors(
     photographs: Sequence[TracedPhotograph], cameras: Cameras, radiance: Numbers, floor: float
 ) -> tuple[list[NDArray[np.float32]], list[NDArray[np.float32]]]:
-    """(P,) of each photograph how far pixels are off, and the same in parts of what they should be."""
-    off, relative = [], []
+    """(P,) of each photograph how far pixels are off, and what they should be, which that is relative to."""
+    off, expected = [], []
     for photograph, even in zip(photographs, cameras.even(photographs), strict=True):
         shown = photograph.rows @ radiance
-        apart = (even - shown).mean(axis=1)
-        off.append(apart.astype(np.float32))
-        relative.append((apart / (shown.mean(axis=1) + floor)).astype(np.float32))
-    return off, relative
+        off.append((even - shown).mean(axis=1).astype(np.float32))
+        expected.append((shown.mean(axis=1) + floor).astype(np.float32))
+    return off, expected
 
 
 def _typical(photographs: Sequence[TracedPhotograph], relative: Sequence[NDArray[np.float32]]) -> float:
