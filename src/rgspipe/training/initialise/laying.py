@@ -62,6 +62,7 @@ class Laid:
     """Surfels on a cloud.
 
     Attributes:
+        surfels: the N that were laid.
         centers: where they stand.
         thinned: the points that they stand for.
         spacing: between them, scene units.
