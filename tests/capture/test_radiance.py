@@ -162,3 +162,14 @@ def test_a_dark_stripe_of_four_surfels_is_as_dark_as_it_is() -> None:
     assert inside.sum() > 20  # 28
     found = measured_radiance(weights(), views).radiance[inside]
     assert np.abs(np.log(found / (0.05 * truth()[inside]))).max() < 0.2  # 0.09
+
+
+def test_photographs_that_are_black_but_for_a_few_pixels_divide_nothing_by_nothing() -> None:
+    """No quantile tells what is bright where more than 99 % of the pixels are black."""
+    sent = torch.zeros(len(frozen_room().surfels), 3)
+    sent[np.abs(plain().seen - 10.0).argmin()] = 1.0
+    views = [replace(view, image=weight.image(sent)) for view, weight in zip(photographs(), weights(), strict=True)]
+    assert torch.stack([view.image for view in views]).quantile(0.99) == 0.0
+    with np.errstate(divide="raise", invalid="raise"):
+        found = measured_radiance(weights(), views)
+    assert np.isfinite(found.radiance).all()
